@@ -18,9 +18,9 @@ from torch.nn import functional as F
 from langflash_core.geometry.cameras import rays
 from langflash_core.keeping import MATCHES
 from langflash_core.memory import give_back
-from langflash_core.network.encoders.late import LateHalf
+from langflash_core.network.encoders.late import LateHalf, with_taught
 from langflash_core.network.encoders.local import LocalFeatures
-from langflash_core.network.encoders.shared import Encoder, Tokens, tokens_to_maps, unflattened
+from langflash_core.network.encoders.shared import Encoder, Tokens, tokens_to_maps
 from langflash_core.network.gaussians import GaussianHead, assemble_gaussians
 from langflash_core.network.layers.decoder import SiameseDecoder, TwoStackDecoder
 from langflash_core.network.many import FEW, groups_of, held, in_groups, together
@@ -65,7 +65,8 @@ class GuidedDepthNet(LangFlashNet):
 
     Trained stage by stage: `depth` = decoder + depth_head, `refine` = refiner, `gaussians` =
     gaussian_head, `language` = language_head, `grouping` = siamese + scratch + grouping,
-    `aggregation` = aggregation, `naming` = namer. The encoder and the local features stay frozen.
+    `aggregation` = aggregation, `naming` = namer; `late` and `deep`, the halves that real photos taught names
+    and depth, learn before (`train late`). The encoder and the local features stay frozen.
     """
 
     frozen = ("encoder", "local")
@@ -81,6 +82,7 @@ class GuidedDepthNet(LangFlashNet):
         self.mixed = False
         self.encoder = Encoder(preset)
         self.late = LateHalf(preset)
+        self.deep = LateHalf(preset, given=1)
         self.local = LocalFeatures()
         self.decoder = TwoStackDecoder(preset)
         self.depth_head = DepthHead(preset)
@@ -92,6 +94,11 @@ class GuidedDepthNet(LangFlashNet):
         self.grouping = SemanticGrouping(preset)
         self.aggregation = Aggregation(preset)
         self.namer = PartNamer(preset)
+
+    def begin_halves(self) -> None:
+        """Let the late halves give the encoder's own tokens, until something is learned."""
+        for half in (self.late, self.deep):
+            half.begin(self.encoder.vit)
 
     def use_bfloat16(self) -> "GuidedDepthNet":
         """Transformers and what names things in it. Depth heads, sweep, local features, poses and Gaussians
@@ -105,15 +112,15 @@ class GuidedDepthNet(LangFlashNet):
             yield
 
     def encode(self, images: Float[Tensor, "B V 3 H W"], Ks: Float[Tensor, "B V 3 3"]) -> Tokens:
-        """Four hooks of the frozen encoder and two of the half that real photos taught; the intrinsics
-        join later."""
+        """Four hooks of the frozen encoder, two of the half that names of real photos taught and one of that
+        which their depth taught; the intrinsics join later."""
         return Tokens.beside([self._encoded(images[:, some]) for some in groups_of(images.shape[1])])
 
     def _encoded(self, images: Tensor) -> Tokens:
         with self._fast(images):
             tokens, early = self.encoder(images)
-            named = tuple(unflattened(t, images) for t in self.late(early, self.encoder.vit))
-        return replace(tokens, named=named).each(self._exact)
+            tokens = with_taught(tokens, early, self.encoder.vit, self.late, self.deep)
+        return tokens.each(self._exact)
 
     def levels(
         self, tokens: Tokens, Ks: Float[Tensor, "B V 3 3"]

@@ -114,7 +114,7 @@ class GuidedDepth(Preset):
     """Side of the grid that the encoder's position codes were trained on."""
     hooks: tuple[int, int, int, int]
     late_rank: int
-    """Of what the matrices of the late half that reads names differ from the encoder's by."""
+    """Of what the matrices of the late halves that photos taught differ from the encoder's by."""
     match_hook: int
     """Index into `hooks` of the tokens that correspondence reads (blocks 3-6 match best)."""
     language_feature: int

@@ -1,10 +1,18 @@
-"""The late half: the encoder's own tokens until something is learned, and what is cut keeps what it can."""
+"""The late halves: the encoder's own tokens until something is learned, what is cut keeps what it can, and
+names and depth each read their own."""
+
+from copy import deepcopy
+from dataclasses import replace
 
 import pytest
 import torch
+from safetensors import safe_open
+from safetensors.torch import save_file
 
 from langflash_core.lab.training.late import WholeLateHalf, cut, soften, whole
-from langflash_core.network import MINI
+from langflash_core.network import MINI, GuidedDepthNet, initial_network, load_network, save_network
+from langflash_core.network.build import build_network
+from langflash_core.network.checkpoints.files import read_weights, start_from
 from langflash_core.network.encoders.late import LateHalf
 from langflash_core.network.encoders.plain import PlainViT
 
@@ -99,15 +107,74 @@ def test_branches_are_skipped_only_while_it_learns(vit, states):
     assert len({tuple(row[0, :4].tolist()) for row in other[-1]}) > 8, "pictures lose different branches"
 
 
-def test_a_network_gives_both_halves(vit):
-    from langflash_core.network.build import build_network
-
-    network = build_network(MINI).eval()
-    network.encoder.vit.load_state_dict(vit.state_dict())
-    network.late.begin(network.encoder.vit)
-    images, Ks = torch.rand(1, 2, 3, 28, 42), torch.eye(3).expand(1, 2, 3, 3)
+def test_a_half_of_one_hook_gives_the_last_alone(vit, states):
+    """To the bit; and stays one of one hook, whole or cut."""
+    late, deep = cut(moved(vit, 4), vit, MINI), LateHalf(MINI, given=1)
+    deep.load_state_dict(late.state_dict())
+    learned = whole(deep, vit).eval()
     with torch.inference_mode():
-        tokens = network.encode(images, Ks)
-    assert [tuple(hook.shape) for hook in tokens.named] == [(1, 2, 6, 384)] * 2
-    assert all(torch.equal(a, b) for a, b in zip(tokens.named, tokens.hooks[2:], strict=True))
-    assert [hook.shape[1] for hook in tokens.views([1]).named] == [1, 1]
+        (last,) = deep(states[1], vit)
+        assert torch.equal(last, late(states[1], vit)[1])
+        for half in (learned, cut(learned, vit, MINI)):
+            assert len(half(states[1], vit)) == 1
+
+
+@pytest.fixture(scope="module")
+def network(vit):
+    torch.manual_seed(3)
+    made = build_network(MINI).eval()
+    made.encoder.vit.load_state_dict(vit.state_dict())
+    made.begin_halves()
+    torch.nn.init.normal_(made.decoder.embed_named.weight)
+    return made
+
+
+IMAGES, KS = torch.rand(1, 2, 3, 28, 42, generator=torch.manual_seed(4)), torch.eye(3).expand(1, 2, 3, 3)
+
+
+def told(network) -> tuple[torch.Tensor, torch.Tensor]:
+    """Names and depth of two photos."""
+    with torch.inference_mode():
+        tokens = network.encode(IMAGES, KS)
+        return network.language(tokens, IMAGES), network.monocular_depth(tokens, KS).log_depths
+
+
+def test_a_network_gives_all_halves(network):
+    with torch.inference_mode():
+        tokens = network.encode(IMAGES, KS)
+    assert [tuple(hook.shape) for hook in (*tokens.named, *tokens.deep)] == [(1, 2, 6, 384)] * 3
+    for own, hook in zip((*tokens.named, *tokens.deep), (*tokens.hooks[2:], tokens.hooks[3]), strict=True):
+        assert torch.equal(own, hook)
+    assert [hook.shape[1] for hook in (*tokens.views([1]).named, *tokens.views([1]).deep)] == [1, 1, 1]
+
+
+@pytest.mark.parametrize(("half", "same"), [("deep", 0), ("late", 1)])
+def test_what_one_half_learns_is_nothing_to_the_other(network, half, same):
+    """To the bit: names do not change with the half of depth, nor depth with that of names."""
+    made = deepcopy(network)
+    before = told(made)
+    with torch.no_grad():
+        for value in getattr(made, half).parameters():
+            value.add_(0.01 * torch.randn_like(value))
+    after = told(made)
+    assert torch.equal(before[same], after[same]) and not torch.allclose(before[1 - same], after[1 - same])
+
+
+def test_files_from_before_depth_had_a_half_tell_the_same_depth(network, tmp_path):
+    """To the bit what the decoder read then: the last hook of the half that names have."""
+    made = deepcopy(network)
+    made.late.load_state_dict(cut(moved(made.encoder.vit, 4), made.encoder.vit, MINI).state_dict())
+    save_network(made, tmp_path / "w.safetensors")
+    with safe_open(tmp_path / "w.safetensors", "pt") as file:
+        old = {name: file.get_tensor(name) for name in file.keys() if not name.startswith("deep.")}  # noqa: SIM118
+        save_file(old, tmp_path / "old.safetensors", file.metadata())
+    found = load_network("mini", tmp_path / "old.safetensors")
+    assert isinstance(found, GuidedDepthNet)
+    started = initial_network(MINI, tmp_path / "old.safetensors")
+    assert start_from(started, read_weights(tmp_path / "old.safetensors")[0], ("late", "deep"))
+    assert all(torch.equal(v, started.late.state_dict()[k]) for k, v in started.deep.state_dict().items())
+    with torch.inference_mode():
+        tokens = found.encode(IMAGES, KS)
+        before = found.monocular_depth(replace(tokens, deep=tokens.named[1:]), KS)
+        assert torch.equal(found.monocular_depth(tokens, KS).log_depths, before.log_depths)
+    assert found.deep.norm.weight.data_ptr() != found.late.norm.weight.data_ptr(), "each learns alone"

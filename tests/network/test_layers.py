@@ -21,8 +21,8 @@ GRID = (3, 4)
 def _tokens(num_views: int) -> Tokens:
     torch.manual_seed(num_views)
     n = GRID[0] * GRID[1]
-    hooks = [torch.randn(1, num_views, n, MINI.encoder_dim) for _ in range(6)]
-    return Tokens(tuple(hooks[:4]), GRID, tuple(hooks[4:]))
+    hooks = [torch.randn(1, num_views, n, MINI.encoder_dim) for _ in range(7)]
+    return Tokens(tuple(hooks[:4]), GRID, tuple(hooks[4:6]), tuple(hooks[6:]))
 
 
 def _intrinsics(num_views: int) -> torch.Tensor:

@@ -130,7 +130,8 @@ def test_many_photos_are_encoded_and_described_as_few(network, images, tokens, m
         at_once(monkeypatch)
         whole = network.encode(images, torch.eye(3).expand(1, VIEWS, 3, 3))
         described = network.language(whole, images)
-    for own, all_of in zip((*tokens.hooks, *tokens.named), (*whole.hooks, *whole.named), strict=True):
+    some, every = ((*of.hooks, *of.named, *of.deep) for of in (tokens, whole))
+    for own, all_of in zip(some, every, strict=True):
         assert torch.allclose(own, all_of, atol=1e-3)  # values up to some tens, through twelve blocks
     assert features.dtype == torch.float16 and torch.allclose(features.float(), described, atol=HALF)
 

@@ -165,7 +165,7 @@ def _late(args: Namespace, out: TextIO) -> None:
             preset=args.preset,
         )
         if leads():
-            print(f"{args.output}: trained the late half, {state.step} steps", file=out)
+            print(f"{args.output}: trained the late halves, {state.step} steps", file=out)
 
 
 def _options(args: Namespace, minutes: float) -> LoopOptions:

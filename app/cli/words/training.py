@@ -250,7 +250,7 @@ def _add_outlines(actions) -> None:
 
 def _add_late(actions) -> None:
     late = new_command(
-        actions, "late", "train the late half of the encoder, names and depth on labelled photos and rooms"
+        actions, "late", "train the late halves of the encoder, names and depth, on labelled photos and rooms"
     )
     late.add_argument("cache", type=Path, metavar="CACHE", help="rooms, made by train cache")
     late.add_argument(

@@ -16,8 +16,6 @@ from langflash_core.lab.training.shards import Label, RoomRecord, Shard, dequant
 from langflash_core.network.encoders.shared import Tokens
 
 PATCH = 14
-HOOKS = 4
-"""Of the frozen encoder; the late half's follow in a record."""
 
 
 @dataclass(frozen=True)
@@ -110,7 +108,7 @@ def _tokens(records: Sequence[RoomRecord]) -> Tokens | None:
     steps = torch.stack([r.tokens for r in records if r.tokens is not None])
     scales = torch.stack([r.token_scales for r in records if r.token_scales is not None])
     hooks = dequantise_tokens(steps, scales).unbind(2)  # (B, V, T, C) each
-    return Tokens(hooks[:HOOKS], (height // PATCH, width // PATCH), hooks[HOOKS:])
+    return Tokens(hooks, (height // PATCH, width // PATCH))
 
 
 class RoomSet:

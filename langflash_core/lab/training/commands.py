@@ -201,12 +201,12 @@ def run_late(
     twice: bool = False,
     preset: str = "mini",
 ) -> LoopState:
-    """Train the late half, and the heads that read it, on labelled photos and the cached rooms.
+    """Train the late halves, and the heads that read them, on labelled photos and the cached rooms.
 
     Args:
         ids: of the photos to learn from. kept: of those to judge by now and then. start: weights file that
-            the run begins with. more: other sets, labelled, in part or not at all; with them the late half
-            goes on from what the weights have instead of beginning anew (`fewlabels`). twice: what the
+            the run begins with. more: other sets, labelled, in part or not at all; with them the late halves
+            go on from what the weights have instead of beginning anew (`fewlabels`). twice: what the
             weights say of mirrored and larger photos teaches them (`twice`), instead of their average.
 
     Raises:
@@ -219,7 +219,7 @@ def run_late(
         sets, judge = Sets.of(photos, ids, more, encode), None
         if kept:
             judge = judge_of(photos, kept, encode, options.device)
-        rooms.tokens = False  # of the frozen half alone, which is run with the other
+        rooms.tokens = False  # of the frozen half alone, which is run with the others
         train = train_twice if twice else train_few
         return train(network, sets, rooms, phrase_table(folder, encode), run_dir, options, judge)
     live = LivePhotos(photos, ids)

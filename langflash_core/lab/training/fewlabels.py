@@ -1,11 +1,11 @@
 """The stage that goes on from taught weights with few labels: other photos teach through an averaged teacher.
 
-The late half (whole blocks), what reads it, and depth learn at once, in the space of texts, so that the
-network is whole after every step. A step sees labelled photos; photos of which little or nothing is known,
-for which the average of the weights so far says what is where in the photo's own light, as it is and
-mirrored, and the network has to say so in another, with pieces of other photos before it and features left
-out; and every third step a rendered room. What the teacher is surer of than it usually is of that class
-counts as a label; of the rest the network learns the odds, and its depth.
+The late halves (whole blocks) and what reads them, names and depth, learn at once, in the space of texts,
+so that the network is whole after every step. A step sees labelled photos; photos of which little or
+nothing is known, for which the average of the weights so far says what is where in the photo's own light,
+as it is and mirrored, and the network has to say so in another, with pieces of other photos before it and
+features left out; and every third step a rendered room. What the teacher is surer of than it usually is of
+that class counts as a label; of the rest the network learns the odds, and its depth.
 
 Sizes: B photos, h w pixels of the language map, P drawn pixels, N names, C channels.
 
@@ -25,15 +25,17 @@ from langflash_core.lab.training.bank import NameBank
 from langflash_core.lab.training.batches import RoomSet, SceneBatch
 from langflash_core.lab.training.losses import depth_loss, error_loss, gradient_loss
 from langflash_core.lab.training.pool import DrawnPhotos, PhotoPool
+from langflash_core.lab.training.real import MODULES
 from langflash_core.lab.training.stages.depth import depth_stage
 from langflash_core.lab.training.stages.language import language_stage, thinned
 from langflash_core.lab.training.stages.pixels import evenly_drawn, nearest
 from langflash_core.lab.training.stages.stage import Loss, Stage, Words, guided
+from langflash_core.network.encoders.late import with_taught
 from langflash_core.network.encoders.shared import Tokens, tokens_to_maps
 from langflash_core.network.guided import GuidedDepthNet
 from langflash_core.network.layers.dpt import double
 
-RATES = {"late": 0.25, "decoder": 0.4, "depth_head": 0.4, "averaged": 0.0}
+RATES = {"late": 0.25, "deep": 0.25, "decoder": 0.4, "depth_head": 0.4, "averaged": 0.0}
 """Of the stage's rate."""
 TEMPERATURE = 16.0
 """Factor on cosines in every softmax."""
@@ -123,7 +125,8 @@ class Averaged(nn.Module):
         super().__init__()
         head = network.language_head
         self.late, self.taught, self.out = deepcopy(network.late), deepcopy(head.taught), deepcopy(head.out)
-        self.decoder, self.depth_head = deepcopy(network.decoder), deepcopy(network.depth_head)
+        self.deep, self.decoder = deepcopy(network.deep), deepcopy(network.decoder)
+        self.depth_head = deepcopy(network.depth_head)
         self.register_buffer("usual", torch.full((len(CLASSES37),), 1 / len(CLASSES37)))
         self.register_buffer("age", torch.tensor(0))
 
@@ -135,7 +138,7 @@ class Averaged(nn.Module):
         head = network.language_head
         pairs = (
             (self.late, network.late), (self.taught, head.taught), (self.out, head.out),
-            (self.decoder, network.decoder), (self.depth_head, network.depth_head),
+            (self.deep, network.deep), (self.decoder, network.decoder), (self.depth_head, network.depth_head),
         )  # fmt: skip
         for own, other in pairs:
             for mine, theirs in zip(own.parameters(), other.parameters(), strict=True):
@@ -154,8 +157,7 @@ class Averaged(nn.Module):
 
     def _look(self, network: GuidedDepthNet, images: Tensor, Ks: Tensor) -> tuple[Tensor, Tensor]:
         tokens, early = network.encoder(images)
-        named = tuple(t.unflatten(0, images.shape[:2]) for t in self.late(early, network.encoder.vit))
-        tokens = Tokens(tokens.hooks, tokens.grid, named)
+        tokens = with_taught(tokens, early, network.encoder.vit, self.late, self.deep)
         taught = double(self.taught(tokens.taught_maps()), align_corners=False)
         hidden = torch.cat((network.language_head.own(tokens), taught), 1).movedim(1, -1)
         return hidden, log_depths(self.decoder, self.depth_head, tokens, Ks)
@@ -183,10 +185,10 @@ def log_depths(decoder: nn.Module, depth_head: nn.Module, tokens: Tokens, Ks: Te
 
 
 def few_stage(bank: NameBank, weights: Weights | None = None) -> Stage:
-    """The late half, whole, and what reads it; `averaged` is the network's while this lasts."""
+    """The late halves, whole, and what reads them; `averaged` is the network's while this lasts."""
     counts = weights or Weights()
     return Stage(
-        "late_few", ("late", "language_head", "decoder", "depth_head", "averaged"), (), {1: 1.0}, 6, 4e-4,
+        "late_few", (*MODULES, "averaged"), (), {1: 1.0}, 6, 4e-4,
         lambda network, batch, words: _loss(guided(network), batch, words, bank, counts), rates=RATES,
     )  # fmt: skip
 

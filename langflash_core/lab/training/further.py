@@ -13,7 +13,7 @@ from langflash_core.lab.training import twice
 from langflash_core.lab.training.bank import NameBank
 from langflash_core.lab.training.batches import RoomSet
 from langflash_core.lab.training.fewlabels import Averaged, FewSet, Weights, few_stage
-from langflash_core.lab.training.late import cut, whole
+from langflash_core.lab.training.late import make_cut, make_whole
 from langflash_core.lab.training.live import LivePhotos
 from langflash_core.lab.training.loop import LoopOptions, Optimising, train_stage
 from langflash_core.lab.training.pool import PhotoPool, PhotoSet
@@ -103,8 +103,7 @@ def train_few(
     Source: Wortsman et al. 2022 (WiSE-FT: weights between those before and after hold better).
     """
     net = guided(network)
-    preset, vit = net.late.preset, net.encoder.vit
-    net.late = whole(net.late, vit)  # type: ignore[assignment]
+    make_whole(net)
     start = {name: value.clone() for name, value in net.state_dict().items() if _learns(name)}
     net.averaged = Averaged(net)  # type: ignore[assignment]
     words = Words(PhraseSampler(table), torch.Generator().manual_seed(options.seed))
@@ -116,7 +115,7 @@ def train_few(
         for name, value in net.state_dict().items():
             if _learns(name) and value.is_floating_point():
                 value.lerp_(start[name].to(value), 1 - LEARNED)
-    net.late = cut(net.late, vit, preset)  # type: ignore[arg-type]
+    make_cut(net)
     save_cut(run_dir / "late.pt", net, replace(stage, name="late", modules=MODULES), state)
     return state
 
@@ -134,14 +133,13 @@ def train_twice(
     """Train whole late blocks and what reads them by what they say themselves of photos seen better, from
     all sets together, and cut the blocks: `RUN/late.pt`, and `RUN/late_twice.pt` to go on from."""
     net = guided(network)
-    preset, vit = net.late.preset, net.encoder.vit
-    net.late = whole(net.late, vit)  # type: ignore[assignment]
+    make_whole(net)
     copy = twice.Copy(net)
     words = Words(PhraseSampler(table), torch.Generator().manual_seed(options.seed))
     options = _steadily(options, TWICE_DECAY)
     stage = twice.twice_stage(sets.told.bank, copy, weights)
     state = train_stage(net, stage, FewSet(sets.together(), None, rooms), words, run_dir, options, kept)
-    net.late = cut(net.late, vit, preset)  # type: ignore[arg-type]
+    make_cut(net)
     save_cut(run_dir / "late.pt", net, replace(stage, name="late", modules=MODULES), state)
     return state
 

@@ -1,4 +1,4 @@
-"""The late half that learns from real photos: whole blocks while they learn, then cut to their rank.
+"""The late halves that learn from real photos: whole blocks while they learn, then cut to their rank.
 
 Whole blocks learn more surely than a product of two thin matrices that starts at zero, and what they have
 learned lies in few directions: of 384, the 52 that are kept name photos as well (model card).
@@ -12,10 +12,13 @@ from torch.nn import functional as F
 
 from langflash_core.network.encoders.late import LateHalf, take_own
 from langflash_core.network.encoders.plain import NORM_EPS, Block, LayerScale, PlainViT, attended, through
+from langflash_core.network.guided import GuidedDepthNet
 from langflash_core.network.presets import GuidedDepth
 
+HALVES = ("late", "deep")
+"""Of a network: names teach the one, depth the other."""
 KEPT = 0.9
-"""Of what the late half learned."""
+"""Of what a late half learned."""
 SKIPPED = 0.1
 """Share of pictures that a branch of a block leaves as they are, while it learns."""
 
@@ -44,10 +47,11 @@ def _scaled(layer: nn.Linear, scale: LayerScale, x: Tensor) -> Tensor:
 class WholeLateHalf(nn.Module):
     """In the place of `LateHalf` while it learns: blocks of its own, as the encoder's to begin with."""
 
-    def __init__(self, preset: GuidedDepth):
+    def __init__(self, preset: GuidedDepth, given: int = 2):
         super().__init__()
+        self.preset = preset
         self.first = preset.hooks[1] + 1
-        self.hooks = tuple(hook - self.first for hook in preset.hooks[2:])
+        self.hooks = tuple(hook - self.first for hook in preset.hooks[-given:])
         self.blocks = nn.ModuleList(
             SkippingBlock(preset.encoder_dim, preset.encoder_heads)
             for _ in range(self.first, preset.encoder_depth)
@@ -63,10 +67,23 @@ class WholeLateHalf(nn.Module):
         return tuple(self.norm(x)[:, 1:] for x in through(self.blocks, early, self.hooks))
 
 
+def make_whole(network: GuidedDepthNet) -> None:
+    """Give a network whole blocks in both late halves, for as long as they learn."""
+    for name in HALVES:
+        setattr(network, name, whole(getattr(network, name), network.encoder.vit))
+
+
+def make_cut(network: GuidedDepthNet) -> None:
+    """Cut both late halves of a network to the rank of its preset."""
+    for name in HALVES:
+        learned = getattr(network, name)
+        setattr(network, name, cut(learned, network.encoder.vit, learned.preset))
+
+
 @torch.no_grad()
 def whole(late: LateHalf, vit: PlainViT) -> WholeLateHalf:
     """The same half as whole blocks; every block starts as the encoder's plus its correction."""
-    answer = WholeLateHalf(late.preset)
+    answer = WholeLateHalf(late.preset, len(late.hooks))
     answer.norm.load_state_dict(late.norm.state_dict())
     for own, (block, base) in zip(answer.each(), late.pairs(vit), strict=True):
         take_own(own, block)
@@ -95,7 +112,7 @@ def cut(learned: WholeLateHalf, vit: PlainViT, preset: GuidedDepth) -> LateHalf:
 
     Source: Eckart and Young 1936 (singular values).
     """
-    answer = LateHalf(preset)
+    answer = LateHalf(preset, len(learned.hooks))
     answer.norm.load_state_dict(learned.norm.state_dict())
     for own, (block, base) in zip(learned.each(), answer.pairs(vit), strict=True):
         take_own(block, own)

@@ -1,10 +1,11 @@
-"""The stage that teaches names and depth by real photos: first the late half, then what reads it.
+"""The stage that teaches names and depth by real photos: first the late halves, then what reads them.
 
-The late half learns from a plain classifier (`teacher`), on photos and now and then a rendered room.
-Then it stays, cut to its rank, and language head, decoder and depth head learn on top: photos teach by a
-softmax over the names of 37 classes, one over fine names, and their depths; every second step a rendered
-room teaches phrases and depth as in the stages `language` and `depth`, so that what no photo names is not
-lost. Measured before: all of it at once, in the space of texts, took four times the steps (model card).
+The late halves learn from a plain classifier (`teacher`), one names and one depth, on photos and now and
+then a rendered room. Then they stay, cut to their rank, and language head, decoder and depth head learn on
+top: photos teach by a softmax over the names of 37 classes, one over fine names, and their depths; every
+second step a rendered room teaches phrases and depth as in the stages `language` and `depth`, so that what
+no photo names is not lost. Measured before: all of it at once, in the space of texts, took four times the
+steps (model card).
 
 Sizes: B photos, H W pixels, h w the language head's own, P pixels, A phrases, C channels.
 """
@@ -21,7 +22,7 @@ from langflash_core.lab.photos import PhotoFolder
 from langflash_core.lab.photos.fitting import fitted
 from langflash_core.lab.photos.names import CLASSES37
 from langflash_core.lab.training.batches import RoomSet, SceneBatch
-from langflash_core.lab.training.late import cut, soften, whole
+from langflash_core.lab.training.late import HALVES, make_cut, make_whole, soften
 from langflash_core.lab.training.live import SIZES, LabelledBatch, LivePhotos
 from langflash_core.lab.training.loop import LoopOptions, Validate, train_stage
 from langflash_core.lab.training.losses import depth_loss, error_loss, gradient_loss
@@ -47,14 +48,14 @@ from langflash_core.network.precision import mixed
 from langflash_core.network.stereo.prior import resize
 
 HEADS = ("language_head", "decoder", "depth_head")
-MODULES = ("late", *HEADS)
+MODULES = (*HALVES, *HEADS)
 """What is left in the network."""
-RATES = {"late": 0.12, "decoder": 0.5, "depth_head": 0.5}
+RATES = {"late": 0.12, "deep": 0.12, "decoder": 0.5, "depth_head": 0.5}
 """Of a stage's rate: what has learned before moves less."""
 LATE_SHARE = 0.6
-"""Of the time, for the late half; the rest is for the heads."""
+"""Of the time, for the late halves; the rest is for the heads."""
 ROOMS_EVERY = 3
-"""A step of the late half with a rendered room."""
+"""A step of the late halves with a rendered room."""
 TEMPERATURE = 16.0
 """Factor on cosines in both softmaxes."""
 HIDDEN = 0.1
@@ -167,16 +168,16 @@ class JointSet:
 
 
 def late_stage(targets: PhotoTargets, names: Names, teacher: Teacher) -> Stage:
-    """The late half, whole, and its teacher (the network's `teacher` while this lasts)."""
+    """The late halves, whole, and their teacher (the network's `teacher` while this lasts)."""
     return Stage(
-        "late_whole", ("late", "teacher"), (), {1: 1.0}, 8, 1e-3,
+        "late_whole", (*HALVES, "teacher"), (), {1: 1.0}, 8, 1e-3,
         lambda network, batch, words: _taught(guided(network), teacher, batch, words, targets, names),
         rates=RATES,
     )  # fmt: skip
 
 
 def heads_stage(targets: PhotoTargets) -> Stage:
-    """What reads the late half, bound to what the photos are called."""
+    """What reads the late halves, bound to what the photos are called."""
     return Stage(
         "late_heads", HEADS, (), {1: 1.0}, 8, 6e-4,
         lambda network, batch, words: _loss(guided(network), batch, words, targets), rates=RATES,
@@ -307,19 +308,20 @@ def train_late(
     """Train whole late blocks, cut them, train what reads them: `RUN/late.pt` is what later stages and
     `train export` read, `RUN/late_whole.pt` and `RUN/late_heads.pt` what a run goes on from."""
     net = guided(network)
-    preset, vit = net.late.preset, net.encoder.vit
     labels = joint.rooms.labels() if joint.rooms is not None else []
     names = Names.of(targets.names, targets.against, targets.balance, labels)
-    teacher = Teacher(preset, len(names.texts))
-    net.late.begin(vit)
-    net.late, net.teacher = whole(net.late, vit), teacher  # type: ignore[assignment]
+    teacher = Teacher(net.late.preset, len(names.texts))
+    net.begin_halves()
+    make_whole(net)
+    net.teacher = teacher
     first = replace(options, minutes=LATE_SHARE * options.minutes)
     rarely = replace(joint, every=ROOMS_EVERY)
     train_stage(net, late_stage(targets, names, teacher), rarely, words, run_dir, first)
     del net.teacher
     hand_over(teacher.cpu(), net.language_head.cpu(), targets.classes)
-    soften(net.late, vit)  # type: ignore[arg-type]
-    net.late = cut(net.late, vit, preset)  # type: ignore[arg-type]
+    for name in HALVES:
+        soften(getattr(net, name), net.encoder.vit)
+    make_cut(net)
     second = replace(options, minutes=options.minutes - first.minutes)
     state = train_stage(net, heads_stage(targets), joint, words, run_dir, second, validate)
     save_cut(run_dir / "late.pt", net, replace(heads_stage(targets), name="late", modules=MODULES), state)

@@ -10,10 +10,12 @@ from typing import Any
 import torch
 from torch import Tensor
 
+from langflash_core.errors import InputError
 from langflash_core.files import write_atomically
 from langflash_core.lab.saving import save_whole
 from langflash_core.lab.training.ranks import leads
 from langflash_core.lab.training.stages.stage import Stage, modules_of
+from langflash_core.network.checkpoints.files import with_deep
 from langflash_core.network.model import LangFlashNet
 
 log = logging.getLogger(__name__)
@@ -78,8 +80,14 @@ def _write(path: Path, content: Mapping[str, Any]) -> None:
 def restore_state(
     network: LangFlashNet, stage: Stage, optimiser: torch.optim.Optimizer, path: Path
 ) -> tuple[LoopState, list[dict[str, Tensor]]]:
-    """Where a run stands, and what it drew; [] of runs that did not keep that."""
+    """Where a run stands, and what it drew; [] of runs that did not keep that.
+
+    Raises:
+        InputError: other parts learned in it, as in runs from before depth had a late half of its own.
+    """
     saved = torch.load(path, map_location="cpu", weights_only=True)
+    if saved["weights"].keys() != stage_parameters(network, stage).keys():
+        raise InputError(f"{path} holds a network of other parts, which cannot go on; name another folder")
     network.load_state_dict(saved["weights"], strict=False)
     optimiser.load_state_dict(saved["optimiser"])
     log.info("%s: continues at step %d, %.0f s", stage.name, saved["step"], saved["seconds"])
@@ -105,5 +113,5 @@ def load_averaged(network: LangFlashNet, run_dir: Path, stage_name: str) -> tupl
     if not path.exists():
         return None
     saved = torch.load(path, map_location="cpu", weights_only=True)
-    network.load_state_dict(saved["ema"], strict=False)
+    network.load_state_dict(with_deep(saved["ema"]), strict=False)
     return int(saved["step"]), float(saved["seconds"])

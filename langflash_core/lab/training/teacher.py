@@ -1,9 +1,10 @@
-"""What teaches the late half: a plain classifier on its tokens, of which the reader stays.
+"""What teaches the late halves: a plain classifier on their tokens, of which the reader of names stays.
 
-A softmax over the 37 classes, one over fine names, and a depth, each read from the tokens by three thin
-layers. Names are rows of a matrix to it, no directions in the space of texts, so it learns from labels in
-a quarter of the steps that the language head took (model card). Afterwards its first two layers become the
-language head's second reader, and its rows of classes the texts' directions (`hand_over`).
+A softmax over the 37 classes and one over fine names, read from the tokens of the one half by three thin
+layers, and a depth, read from those of the other by as many. Names are rows of a matrix to it, no directions
+in the space of texts, so it learns from labels in a quarter of the steps that the language head took (model
+card). Afterwards the first two layers of names become the language head's second reader, and the rows of
+classes the texts' directions (`hand_over`).
 
 Sizes: B photos, V views, H W pixels, h w the token grid, N names.
 """
@@ -20,7 +21,7 @@ from langflash_core.lab.photos.names import CLASSES37, class_of
 from langflash_core.lab.training.losses import depth_loss, gradient_loss
 from langflash_core.lab.training.shards import NOTHING, Label
 from langflash_core.lab.training.stages.pixels import evenly_drawn, nearest
-from langflash_core.network.encoders.shared import Tokens
+from langflash_core.network.encoders.shared import Tokens, tokens_to_maps
 from langflash_core.network.presets import GuidedDepth
 from langflash_core.network.semantics.features import LanguageHead, TaughtReader
 from langflash_core.network.stereo.prior import resize
@@ -89,13 +90,15 @@ class Teacher(nn.Module):
         super().__init__()
         self.names = names
         self.reader = TaughtReader(preset)
-        self.say = nn.Conv2d(preset.taught_feature, len(CLASSES37) + names + 1, 1)
+        self.say = nn.Conv2d(preset.taught_feature, len(CLASSES37) + names, 1)
+        self.depths = nn.Sequential(TaughtReader(preset, 2), nn.Conv2d(preset.taught_feature, 1, 1))
 
     def forward(self, tokens: Tokens) -> tuple[Tensor, Tensor, Tensor]:
         """(B*V, 37, 2h, 2w), (B*V, N, 2h, 2w), (B*V, 2h, 2w)."""
         maps = F.dropout2d(tokens.taught_maps(), HIDDEN, self.training)
-        said = self.say(self.reader(maps)).float()
-        classes, names, depths = said.split((len(CLASSES37), self.names, 1), 1)
+        classes, names = self.say(self.reader(maps)).float().split((len(CLASSES37), self.names), 1)
+        far = torch.cat((tokens.maps(1), tokens_to_maps(tokens.deep[-1].flatten(0, 1), tokens.grid)), 1)
+        depths = self.depths(F.dropout2d(far, HIDDEN, self.training)).float()
         return classes, names, depths[:, 0] + _TYPICAL_LOG_DEPTH
 
     def loss(

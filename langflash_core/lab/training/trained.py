@@ -5,6 +5,7 @@ from collections.abc import Iterable
 from pathlib import Path
 
 from langflash_core.errors import InputError
+from langflash_core.lab.training.late import HALVES
 from langflash_core.lab.training.real import MODULES
 from langflash_core.lab.training.recipes import Recipe, stages_of
 from langflash_core.lab.training.stages.language import language_stage
@@ -42,8 +43,8 @@ def prepared(
 
 
 def load_trained(network: LangFlashNet, run_dir: Path) -> dict[str, int]:
-    """Steps of every stage in a run, whose weights the network then has; the late half, and what learned
-    with it, before those that went on."""
+    """Steps of every stage in a run, whose weights the network then has; the late halves, and what
+    learned with them, before those that went on."""
     names = (LATE.name, *stages_of(network.preset.name))
     found = {name: load_averaged(network, run_dir, name) for name in names}
     return {name: counts[0] for name, counts in found.items() if counts is not None}
@@ -55,7 +56,7 @@ def begin(network: LangFlashNet, start: Path, done: Iterable[str]) -> list[str]:
     filled = {module for name in done for module in (LATE if name == LATE.name else ALL_STAGES[name]).modules}
     tensors, _ = read_weights(start)
     if LATE.name not in done:
-        start_from(network, tensors, ("late",))
+        start_from(network, tensors, HALVES)
     names = [name for name in ALL_STAGES if name not in done]
     return [
         name

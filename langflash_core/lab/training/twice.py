@@ -12,7 +12,7 @@ Source: Furlanello et al. 2018 (born again); Radosavovic et al. 2018 (data disti
 """
 
 from copy import deepcopy
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import torch
 from torch import Tensor
@@ -35,10 +35,11 @@ from langflash_core.lab.training.pool import DrawnPhotos
 from langflash_core.lab.training.real import MODULES
 from langflash_core.lab.training.stages.language import thinned
 from langflash_core.lab.training.stages.stage import Loss, Stage, Words, guided
+from langflash_core.network.encoders.late import with_taught
 from langflash_core.network.encoders.shared import Tokens
 from langflash_core.network.guided import GuidedDepthNet
 
-RATES = {"late": 0.25, "language_head": 0.5, "decoder": 0.75, "depth_head": 0.75}
+RATES = {"late": 0.25, "deep": 0.25, "language_head": 0.5, "decoder": 0.75, "depth_head": 0.75}
 """Of the stage's rate, which is low: at ten times as much the classes are lost at once (MEASURED.md)."""
 PIXELS = 8000
 """Drawn from all photos of a step."""
@@ -62,8 +63,8 @@ class Copy:
 
     def __init__(self, network: GuidedDepthNet):
         self.encoder = network.encoder
-        parts = (network.late, network.language_head, network.decoder, network.depth_head)
-        self.late, self.head, self.decoder, self.depth_head = (
+        parts = (network.late, network.deep, network.language_head, network.decoder, network.depth_head)
+        self.late, self.deep, self.head, self.decoder, self.depth_head = (
             deepcopy(part).eval().requires_grad_(False) for part in parts
         )
 
@@ -71,8 +72,7 @@ class Copy:
     def looks(self, images: Tensor, Ks: Tensor) -> tuple[Tensor, Tensor]:
         """Unit features (B, C, h, w) and log depths (B, H, W) of photos (B, 1, 3, H, W)."""
         tokens, early = self.encoder(images)
-        named = tuple(t.unflatten(0, images.shape[:2]) for t in self.late(early, self.encoder.vit))
-        tokens = replace(tokens, named=named)
+        tokens = with_taught(tokens, early, self.encoder.vit, self.late, self.deep)
         return self.head(tokens)[:, 0].float(), log_depths(self.decoder, self.depth_head, tokens, Ks)
 
     def says(self, photos: DrawnPhotos) -> tuple[Tensor, Tensor]:
@@ -93,7 +93,7 @@ class Copy:
 
 
 def twice_stage(bank: NameBank, copy: Copy, weights: Weights | None = None) -> Stage:
-    """The late half, whole, and what reads it, taught by a copy of what they were."""
+    """The late halves, whole, and what reads them, taught by a copy of what they were."""
     counts = weights or Weights()
     return Stage(
         "late_twice", MODULES, (), {1: 1.0}, 8, 4e-5,

@@ -62,7 +62,7 @@ def load_network(
         )
     with torch.device("meta"):  # no memory and no drawn numbers: it takes over those of the file
         network = build_network(PRESETS[preset]).eval()
-    load_strictly(network, _tensors(stored.arrays), path, assign=True)
+    load_strictly(network, with_deep(_tensors(stored.arrays)), path, assign=True)
     assert not any(buffer.is_meta for buffer in network.buffers())
     network.calibration = stored.header.get("calibration", {})
     return (network.use_bfloat16() if bfloat16 else network).to(device)
@@ -88,7 +88,7 @@ def initial_network(preset: Preset, frozen: Path, seed: int = 0) -> LangFlashNet
         own = dequantise(quantise(own)) if network.compact else own
         load_strictly(getattr(network, name), own, frozen)
     if isinstance(network, GuidedDepthNet):
-        network.late.begin(network.encoder.vit)
+        network.begin_halves()
     return network
 
 
@@ -102,7 +102,7 @@ def adopt_frozen(preset: Preset, encoder: Path, local: Path, out: Path, seed: in
             f"the preset '{preset.name}' takes published weights as they are; use `langflash weights import`"
         )
     load_strictly(network.encoder.vit, read_weights(encoder)[0], encoder)
-    network.late.begin(network.encoder.vit)
+    network.begin_halves()
     load_strictly(network.local, convert(read_weights(local)[0]), local)
     save_network(network, out)
 
@@ -156,7 +156,15 @@ def read_weights(path: Path) -> tuple[dict[str, Shaped[Tensor, "..."]], dict]:
         WeightsError: there is none, or it is no safetensors file.
     """
     stored = read_stored(path)
-    return _tensors(stored.arrays), stored.header
+    return with_deep(_tensors(stored.arrays)), stored.header
+
+
+def with_deep(tensors: dict[str, Shaped[Tensor, "..."]]) -> dict[str, Shaped[Tensor, "..."]]:
+    """Tensors from before depth had a late half of its own: there it takes over the one that names have."""
+    if any(name.startswith("deep.") for name in tensors):
+        return tensors
+    late = {name: value for name, value in tensors.items() if name.startswith("late.")}
+    return tensors | {f"deep.{name.removeprefix('late.')}": value.clone() for name, value in late.items()}
 
 
 def quantise(tensors: Mapping[str, Shaped[Tensor, "..."]]) -> dict[str, Shaped[Tensor, "..."]]:

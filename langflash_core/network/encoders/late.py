@@ -1,9 +1,11 @@
-"""The encoder's late half once more, corrected by what real photos with names taught.
+"""The encoder's late half twice more, corrected by what real photos taught: by names, and by depth.
 
-Depth, stereo and grouping go on reading the tokens they were trained on; names, and depth beside its
-own, read these. Both halves share the early blocks, so a photo costs half an encoder more.
+Stereo and grouping go on reading the tokens they were trained on; names, and depth beside its own, read
+these, each those of a half of its own, so that neither moves the other. All share the early blocks: a photo
+costs half an encoder more for each.
 """
 
+from dataclasses import replace
 from typing import cast
 
 import torch
@@ -12,6 +14,7 @@ from torch import Tensor, nn
 from torch.nn import functional as F
 
 from langflash_core.network.encoders.plain import NORM_EPS, Block, LayerScale, PlainViT, attended
+from langflash_core.network.encoders.shared import Tokens
 from langflash_core.network.presets import GuidedDepth
 
 _OWN = ("norm1.weight", "norm1.bias", "norm2.weight", "norm2.bias", "ls1.gamma", "ls2.gamma")
@@ -27,18 +30,18 @@ def take_own(block: nn.Module, other: nn.Module) -> None:
 
 class LateHalf(nn.Module):
     """Blocks after the second hook whose matrices are the encoder's plus one of rank `late_rank`; norms,
-    biases and layer scales are their own.
+    biases and layer scales are their own. It gives the last `given` hooks.
 
     Whole blocks would be three times as large; what was learned fits into few directions.
 
     Source: Hu et al. 2022 (LoRA). How they are found: `lab/training/late.py`.
     """
 
-    def __init__(self, preset: GuidedDepth):
+    def __init__(self, preset: GuidedDepth, given: int = 2):
         super().__init__()
         self.preset = preset
         self.first = preset.hooks[1] + 1
-        self.hooks = tuple(hook - self.first for hook in preset.hooks[2:])
+        self.hooks = tuple(hook - self.first for hook in preset.hooks[-given:])
         self.blocks = nn.ModuleList(
             CorrectedBlock(preset.encoder_dim, preset.encoder_heads, preset.late_rank)
             for _ in range(self.first, preset.encoder_depth)
@@ -62,13 +65,22 @@ class LateHalf(nn.Module):
         return [(cast(CorrectedBlock, own), cast(Block, base)) for own, base in pairs]
 
     def forward(self, early: Float[Tensor, "n T C"], vit: PlainViT) -> tuple[Float[Tensor, "n _ C"], ...]:
-        """Normed tokens (n, h*w, C) of the last two hooks; early (n, 1 + h*w, C): of `vit.states`."""
+        """Normed tokens (n, h*w, C) of each hook; early (n, 1 + h*w, C): of `vit.states`."""
         given, x = [], early
         for depth, (own, block) in enumerate(self.pairs(vit)):
             x = own(x, block)
             if depth in self.hooks:
                 given.append(self.norm(x)[:, 1:])
         return tuple(given)
+
+
+def with_taught(
+    tokens: Tokens, early: Float[Tensor, "n T C"], vit: PlainViT, late: nn.Module, deep: nn.Module
+) -> Tokens:
+    """Tokens of the encoder with those of both halves that photos taught, `late` names and `deep` depth;
+    early (B*V, 1 + h*w, C): of `vit.states`."""
+    named, far = (tuple(t.unflatten(0, tokens.shape) for t in half(early, vit)) for half in (late, deep))
+    return replace(tokens, named=named, deep=far)
 
 
 class CorrectedBlock(nn.Module):

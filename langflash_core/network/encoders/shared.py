@@ -19,13 +19,15 @@ _STD = (0.229, 0.224, 0.225)
 class Tokens:
     """Encoder tokens of V views: four hooks (B, V, h*w, C), after the final norm; grid (h, w).
 
-    named: the last two hooks once more, from the half that real photos taught; () where there is none.
+    named: the last two hooks once more, from the half that names of real photos taught; () without one.
+    deep: the last hook once more, from the half that their depth taught; () without one.
     grouped: the hooks once more, from the encoder that the grouping was trained on; () where it is this one.
     """
 
     hooks: tuple[Float[Tensor, "B V _ _"], ...]
     grid: tuple[int, int]
     named: tuple[Float[Tensor, "B V _ _"], ...] = ()
+    deep: tuple[Float[Tensor, "B V _ _"], ...] = ()
     grouped: tuple[Float[Tensor, "B V _ _"], ...] = ()
 
     @property
@@ -39,30 +41,30 @@ class Tokens:
 
     def taught_maps(self) -> Float[Tensor, "n C h w"]:
         """What the classifier of real photos reads, (B*V, 3C, h, w): the last early hook and those of the
-        half that photos taught."""
+        half that their names taught."""
         deep = (tokens_to_maps(t.flatten(0, 1), self.grid) for t in self.named)
         return torch.cat((self.maps(1), *deep), 1)
 
     def each(self, change: Callable[[Tensor], Tensor]) -> "Tokens":
         """Every hook (B, V, h*w, C) changed alike."""
-        hooks, named, grouped = (tuple(map(change, kind)) for kind in (self.hooks, self.named, self.grouped))
-        return Tokens(hooks, self.grid, named, grouped)
+        hooks, named, deep, grouped = (tuple(map(change, kind)) for kind in self._kinds)
+        return Tokens(hooks, self.grid, named, deep, grouped)
+
+    @property
+    def _kinds(self) -> tuple[tuple[Float[Tensor, "B V _ _"], ...], ...]:
+        return self.hooks, self.named, self.deep, self.grouped
 
     @staticmethod
     def beside(parts: Sequence["Tokens"]) -> "Tokens":
         """Those of several groups of views, one after the other."""
         if len(parts) == 1:
             return parts[0]
-        kinds = (
-            [part.hooks for part in parts],
-            [part.named for part in parts],
-            [part.grouped for part in parts],
-        )
         count = sum(part.shape[1] for part in parts)
-        hooks, named, grouped = (
-            tuple(together(same, count, 1) for same in zip(*kind, strict=True)) for kind in kinds
+        hooks, named, deep, grouped = (
+            tuple(together(same, count, 1) for same in zip(*kind, strict=True))
+            for kind in zip(*(part._kinds for part in parts), strict=True)
         )
-        return Tokens(hooks, parts[0].grid, named, grouped)
+        return Tokens(hooks, parts[0].grid, named, deep, grouped)
 
     def for_grouping(self) -> "Tokens":
         """Those that the grouping reads."""

@@ -100,6 +100,7 @@ class TwoStackDecoder(TwoStacks):
     def __init__(self, preset: Preset):
         super().__init__(preset)
         self.intrinsics = nn.Linear(9, preset.decoder_dim)
+        # Called so in weights files: before depth had a half of its own it read that of names.
         self.embed_named = nn.Linear(preset.encoder_dim, preset.decoder_dim, bias=False)
         nn.init.zeros_(self.embed_named.weight)
 
@@ -109,13 +110,13 @@ class TwoStackDecoder(TwoStacks):
         """Tokens (B, V, h*w, C) after half of the layers and after the last.
 
         Args:
-            tokens: of the encoder; the last hook is decoded, and what real photos taught beside it.
+            tokens: of the encoder; the last hook is decoded, and what depth of real photos taught beside it.
             Ks: (B, V, 3, 3), pixels of the encoded images.
             read: which others each view reads; None: all.
         """
         height, width = (side * self.patch for side in tokens.grid)
         camera = self.intrinsics(normalised_intrinsics(Ks, width, height))[:, :, None]
-        seen = self.embed(tokens.hooks[-1]) + self.embed_named(tokens.named[-1])
+        seen = self.embed(tokens.hooks[-1]) + self.embed_named(tokens.deep[-1])
         given = self.layers(torch.cat((seen, camera), 2), tokens.grid, read)
         middle = given[max(len(given) // 2, 1) - 1]
         return middle[:, :, :-1], given[-1][:, :, :-1]

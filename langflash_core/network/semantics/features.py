@@ -15,15 +15,15 @@ from langflash_core.network.presets import GuidedDepth
 
 
 class TaughtReader(nn.Module):
-    """Tokens of the half that real photos taught -> what can be told of each quarter of a patch."""
+    """Tokens of a half that real photos taught -> what can be told of each quarter of a patch."""
 
-    def __init__(self, preset: GuidedDepth):
+    def __init__(self, preset: GuidedDepth, hooks: int = 3):
         super().__init__()
-        self.read = nn.Conv2d(3 * preset.encoder_dim, preset.taught_feature, 1)
+        self.read = nn.Conv2d(hooks * preset.encoder_dim, preset.taught_feature, 1)
         self.mix = nn.Conv2d(preset.taught_feature, preset.taught_feature, 3, padding=1)
 
     def forward(self, maps: Float[Tensor, "n C h w"]) -> Float[Tensor, "n D _ _"]:
-        """Maps of `Tokens.taught_maps` (n, 3C, h, w) -> (n, F, 2h, 2w)."""
+        """Maps of so many hooks (n, hooks * C, h, w), `Tokens.taught_maps` -> (n, F, 2h, 2w)."""
         return F.gelu(self.mix(double(F.gelu(self.read(maps)), align_corners=False)))
 
 

@@ -30,7 +30,7 @@ def checkpoint(tmp_path_factory):
     torch.manual_seed(0)
     path = tmp_path_factory.mktemp("weights") / "drawn.safetensors"
     network = GuidedDepthNet(MINI)
-    network.late.begin(network.encoder.vit)
+    network.begin_halves()
     save_network(network, path)
     return path
 
@@ -195,7 +195,7 @@ def test_photos_are_cached(run, checkpoint, photos, tmp_path):
 
 
 def test_the_late_half_is_trained_and_exported(run, checkpoint, photos, tmp_path):
-    """Two steps on six photos and two rooms; what comes out is a network whose late half has moved."""
+    """Two steps on six photos and two rooms; what comes out is a network whose late halves have moved."""
     for number in range(3, 7):
         for folder in ("images", "labels"):
             content = next((photos / folder).glob("1.*"))
@@ -209,7 +209,7 @@ def test_the_late_half_is_trained_and_exported(run, checkpoint, photos, tmp_path
     assert run("train", "export", tmp_path / "run", "-o", out, "--start", checkpoint).code == 0
     before, after = (load_network("mini", path).state_dict() for path in (checkpoint, out))
     moved = {key.split(".")[0] for key in before if not torch.equal(before[key], after[key])}
-    assert moved == {"late", "language_head", "decoder", "depth_head"}
+    assert moved == {"late", "deep", "language_head", "decoder", "depth_head"}
 
 
 def test_the_late_half_goes_on_with_other_photos(run, checkpoint, photos, tmp_path):

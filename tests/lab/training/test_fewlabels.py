@@ -26,7 +26,7 @@ from langflash_core.lab.training.fewlabels import (
     scaled,
 )
 from langflash_core.lab.training.further import Sets, train_few
-from langflash_core.lab.training.late import SkippingBlock, whole
+from langflash_core.lab.training.late import SkippingBlock, make_whole
 from langflash_core.lab.training.loop import LoopOptions, Optimising
 from langflash_core.lab.training.real import MODULES
 from langflash_core.lab.training.shards import Label, write_shard
@@ -120,7 +120,7 @@ def test_what_a_set_does_not_name_changes_no_loss():
 def network():
     torch.manual_seed(0)
     made = build_network(MINI)
-    made.late.begin(made.encoder.vit)
+    made.begin_halves()
     return made
 
 
@@ -203,7 +203,7 @@ def test_a_few_steps_teach_and_end_in_a_cut_half(sets, tmp_path):
     def run(steps: int):
         torch.manual_seed(0)
         network = build_network(MINI)
-        network.late.begin(network.encoder.vit)
+        network.begin_halves()
         told = replace(options, max_steps=steps)
         return network, train_few(network, sets, rooms, table, tmp_path / "run", told)
 
@@ -232,7 +232,26 @@ def test_a_few_steps_teach_and_end_in_a_cut_half(sets, tmp_path):
     ours, theirs = network.state_dict(), fresh.state_dict()
     for key in (key for key in ours if key.split(".")[0] in MODULES):
         assert torch.equal(ours[key], theirs[key]), key
-    assert float(network.late.get_parameter("blocks.0.qkv.up").detach().abs().max()) > 0
+    for half in (network.late, network.deep):
+        assert float(half.get_parameter("blocks.0.qkv.up").detach().abs().max()) > 0
+
+
+def test_names_teach_one_half_and_depth_the_other(sets, network):
+    made = deepcopy(network)
+    make_whole(made)
+    torch.nn.init.normal_(made.decoder.embed_named.weight, std=0.02)  # it begins at 0
+    photos, generator = sets.told.draw(2, torch.Generator().manual_seed(0)), torch.Generator().manual_seed(0)
+    tokens = made.encode(photos.relit, photos.Ks)
+    hidden, out = fewlabels.read(made, tokens), made.language_head.out
+    names, _ = fewlabels.told_loss(hidden, out, photos, sets.told.bank, 0.5, generator)
+    depth = fewlabels._depth(made, tokens, photos.Ks, photos.depths)
+    for loss, learns, rests in ((names, made.late, made.deep), (depth, made.deep, made.late)):
+        of = [
+            torch.autograd.grad(loss, [*half.parameters()], retain_graph=True, allow_unused=True)
+            for half in (learns, rests)
+        ]
+        assert any(value is not None and bool(value.any()) for value in of[0])
+        assert all(value is None for value in of[1])
 
 
 @pytest.mark.parametrize("sure", [0.0, 1.1])
@@ -240,7 +259,7 @@ def test_photos_without_labels_teach_by_the_teacher_alone(sets, network, monkeyp
     """A gradient comes from what it is sure of, and none, but no failure, where it is sure of nothing."""
     monkeypatch.setattr(fewlabels, "SURE", sure)
     made = deepcopy(network)
-    made.late = whole(made.late, made.encoder.vit)
+    make_whole(made)
     made.averaged = Averaged(made)
     made.requires_grad_(False)
     made.late.requires_grad_(True)
@@ -263,7 +282,7 @@ def test_an_interrupted_run_of_batches_drawn_ahead_goes_on_as_one_that_was_not(s
         for stop in stops:
             torch.manual_seed(0)
             network = build_network(MINI)
-            network.late.begin(network.encoder.vit)
+            network.begin_halves()
             train_few(network, sets, None, table, folder, replace(options, max_steps=stop))
         rows = [json.loads(line) for line in (folder / "late_few.jsonl").read_text().splitlines()]
         return [row["loss"] for row in rows if row["kind"] == "train" and "loss" in row]

@@ -8,6 +8,7 @@ from pathlib import Path
 import pytest
 import torch
 
+from langflash_core.errors import InputError
 from langflash_core.lab.training.loop import LoopOptions, learning_rate, train_stage
 from langflash_core.lab.training.stages.stage import Loss
 from langflash_core.lab.training.stages.table import STAGES
@@ -44,6 +45,16 @@ def test_a_restart_forgets(rooms, words, network, tmp_path: Path):
     train_stage(network(), STAGE, rooms, words, tmp_path, OPTIONS)
     state = train_stage(network(), STAGE, rooms, words, tmp_path, replace(OPTIONS, resume=False, max_steps=1))
     assert state.step == 1
+
+
+def test_a_run_of_other_parts_does_not_go_on(rooms, words, network, tmp_path: Path):
+    """As one from before a part was there: one sentence, not the optimiser's complaint."""
+    train_stage(network(), STAGE, rooms, words, tmp_path, replace(OPTIONS, max_steps=1))
+    saved = torch.load(tmp_path / "refine.pt", weights_only=True)
+    saved["weights"].pop("refiner.sharpness")
+    torch.save(saved, tmp_path / "refine.pt")
+    with pytest.raises(InputError, match="other parts"):
+        train_stage(network(), STAGE, rooms, words, tmp_path, OPTIONS)
 
 
 def test_a_step_without_a_finite_loss_changes_nothing(rooms, words, network, tmp_path: Path):

@@ -141,7 +141,7 @@ def test_a_few_steps_teach_names_and_end_in_a_cut_half(photos, targets, tmp_path
 
     torch.manual_seed(0)
     network = build_network(MINI)
-    network.late.begin(network.encoder.vit)
+    network.begin_halves()
     table = build_table([Label("chair", "chair")], encode)
     words = Words(PhraseSampler(table), torch.Generator().manual_seed(0))
     options = LoopOptions(minutes=10, max_steps=6, report_s=0.0, pictures=2, learning_rate=3e-3)
@@ -158,7 +158,14 @@ def test_a_few_steps_teach_names_and_end_in_a_cut_half(photos, targets, tmp_path
     for name in MODULES:
         for key in (key for key in ours if key.startswith(f"{name}.")):
             assert torch.equal(ours[key], theirs[key]), key
-    assert float(network.late.get_parameter("blocks.0.qkv.up").detach().abs().max()) > 0
+    for half in (network.late, network.deep):
+        assert float(half.get_parameter("blocks.0.qkv.up").detach().abs().max()) > 0
+    saved = torch.load(tmp_path / "late.pt", weights_only=True)
+    saved["ema"] = {name: value for name, value in saved["ema"].items() if not name.startswith("deep.")}
+    torch.save(saved, tmp_path / "late.pt")  # as runs left it before depth had a half of its own
+    assert load_averaged(fresh, tmp_path, "late") is not None
+    for key, value in network.late.state_dict().items():
+        assert torch.equal(fresh.deep.state_dict()[key], value), key
 
 
 def test_kept_photos_judge_by_names_and_by_depth(photos, targets):

@@ -55,7 +55,8 @@ def test_loss_is_the_weighted_cross_entropy_of_what_is_labelled(names):
     torch.manual_seed(0)
     teacher = Teacher(MINI, len(names.texts)).eval()
     hooks = tuple(torch.randn(1, 1, 4, MINI.encoder_dim) for _ in range(4))
-    tokens = Tokens(hooks, (2, 2), tuple(torch.randn(1, 1, 4, MINI.encoder_dim) for _ in range(2)))
+    taught = tuple(torch.randn(1, 1, 4, MINI.encoder_dim) for _ in range(3))
+    tokens = Tokens(hooks, (2, 2), taught[:2], taught[2:])
     ids = torch.zeros(1, 16, 16, dtype=torch.int64)
     ids[:, :8], ids[:, 8:, :8] = 1, 2
     chair, wall = CLASSES37.index("chair"), CLASSES37.index("wall")
@@ -99,6 +100,7 @@ def test_the_language_head_says_what_the_teacher_says(names):
         tuple(torch.randn(1, 1, 6, MINI.encoder_dim) for _ in range(4)),
         (2, 3),
         tuple(torch.randn(1, 1, 6, MINI.encoder_dim) for _ in range(2)),
+        (torch.randn(1, 1, 6, MINI.encoder_dim),),
     )
     hand_over(teacher, head, texts)
     with torch.inference_mode():
@@ -129,7 +131,7 @@ def test_both_parts_are_as_loud_whatever_the_head_was(names):
 def test_nothing_labelled_teaches_nothing(names):
     teacher = Teacher(MINI, len(names.texts))
     hooks = tuple(torch.randn(1, 1, 4, MINI.encoder_dim) for _ in range(4))
-    tokens = Tokens(hooks, (2, 2), hooks[2:])
+    tokens = Tokens(hooks, (2, 2), hooks[2:], hooks[3:])
     ids, depths = torch.zeros(1, 16, 16, dtype=torch.int64), torch.zeros(1, 16, 16)
     rows = Rows(torch.tensor([-1]), torch.tensor([-1]))
     total, _ = teacher.loss(tokens, ids, rows, depths, names, torch.Generator())
@@ -137,3 +139,15 @@ def test_nothing_labelled_teaches_nothing(names):
     assert float(total.detach()) == 0 and all(
         torch.isfinite(p.grad).all() for p in teacher.parameters() if p.grad is not None
     )
+
+
+def test_names_and_depth_are_read_from_halves_of_their_own(names):
+    """What one half gives teaches nothing to the other."""
+    torch.manual_seed(0)
+    teacher = Teacher(MINI, len(names.texts)).eval()
+    hooks = tuple(torch.randn(1, 1, 4, MINI.encoder_dim) for _ in range(4))
+    named, far = (torch.randn(1, 1, 4, MINI.encoder_dim).requires_grad_() for _ in range(2))
+    classes, fine, logs = teacher(Tokens(hooks, (2, 2), (named, named), (far,)))
+    for said, own, other in ((classes.sum() + fine.sum(), named, far), (logs.sum(), far, named)):
+        mine, theirs = torch.autograd.grad(said, (own, other), allow_unused=True)
+        assert bool(mine.abs().sum() > 0) and theirs is None

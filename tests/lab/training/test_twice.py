@@ -36,7 +36,7 @@ def sets(tmp_path_factory):
 def network():
     torch.manual_seed(0)
     made = build_network(MINI)
-    made.late.begin(made.encoder.vit)
+    made.begin_halves()
     return made.eval()
 
 
@@ -84,7 +84,7 @@ def test_a_copy_stays_what_it_was(network):
     with torch.no_grad():
         bias += 1
     assert torch.allclose(copy.head.get_parameter("out.bias") + 1, bias)
-    assert not any(value.requires_grad for value in copy.late.parameters())
+    assert not any(value.requires_grad for half in (copy.late, copy.deep) for value in half.parameters())
 
 
 def test_photos_without_larger_pictures_are_refused(sets, network):
@@ -142,4 +142,5 @@ def test_a_few_steps_teach_and_end_in_a_cut_half(sets, tmp_path, network):
         key for row in taught for key in row
     }
     assert (tmp_path / "run" / "late.pt").exists()
-    assert float(network.late.get_parameter("blocks.0.qkv.up").detach().abs().max()) > 0
+    for half in (network.late, network.deep):
+        assert float(half.get_parameter("blocks.0.qkv.up").detach().abs().max()) > 0

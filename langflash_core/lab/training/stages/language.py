@@ -1,5 +1,7 @@
 """Language features, from phrases for the instances of single pictures."""
 
+from dataclasses import replace
+
 import torch
 from torch import Tensor
 from torch.nn import functional as F
@@ -53,13 +55,14 @@ def language_stage(network: LangFlashNet, batch: SceneBatch, words: Words) -> Lo
 
 
 def thinned(tokens: Tokens, share: float, generator: torch.Generator) -> Tokens:
-    """Tokens with `share` of each view's channels set to 0 and the rest scaled up, hook by hook."""
+    """Tokens with `share` of each view's channels set to 0 and the rest scaled up, hook by hook; without
+    those of depth, which no name reads."""
 
     def thin(hook: Tensor) -> Tensor:
         kept = torch.rand(*hook.shape[:2], 1, hook.shape[-1], generator=generator) >= share
         return hook * (kept.to(hook) / (1 - share))
 
-    return tokens.each(thin)
+    return replace(tokens, deep=()).each(thin)
 
 
 def phrase_bank(used: Tensor, words: Words, extra: int = 128) -> Tensor:

@@ -56,11 +56,9 @@ class Stage:
 
 
 def tokens_of(network: LangFlashNet, batch: SceneBatch) -> Tokens:
-    """Tokens of a batch, also what the late half says, which no cache holds: it learns."""
+    """Tokens of a batch, also what the late halves say, which no cache holds: they learn."""
     if not network.caches_tokens:  # but `frozen` keeps them while nothing before them learns
         return network.encode(batch.images, batch.Ks) if batch.frozen is None else batch.frozen.tokens
-    if batch.tokens is not None and batch.tokens.named:
-        return batch.tokens
     with torch.no_grad():
         return network.encode(batch.images, batch.Ks)
 
