@@ -248,7 +248,9 @@ class SceneArrived:
             return state
         state = state.with_editing(saved=self.room.saved)
         hidden = {"unhidden": self.room.unhidden, "shown_by": self.room.shown_by}
-        return state.with_scene(photos=self.room.photos, pose=self.room.pose, view=None, **hidden)
+        pose, views = self.room.pose, self.info.views
+        view = views.index(pose) if pose in views else None  # as where one stands at a photo
+        return state.with_scene(photos=self.room.photos, pose=pose, view=view, **hidden)
 
     def _others(self, state: State) -> tuple[Room, ...]:
         return state.scene.rooms if self.replaces else _rooms(state, self.info)

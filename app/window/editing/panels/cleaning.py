@@ -20,7 +20,7 @@ from ..cleaning import ABOVE, BELOW, Condition
 from ..state import Floaters
 
 _WIDE, _TOP, _MARGIN = 360.0, 150.0, 12.0  # design pixels; _TOP: below the axes
-_HIGH = 460.0  # at the most
+_HIGH = 530.0  # at the most; of what a box needs
 _NAME, _SIDE, _VALUE = 106.0, 76.0, 80.0
 _NAMES = {
     "confidence": "Sureness", "size": "Size", "opacity": "Opacity", "depth": "Distance",
@@ -182,6 +182,10 @@ def _limits(preview: Floaters, look: Look) -> list[do.Command]:
     changed, on = widgets.checkbox("All the rest instead", preview.recipe.invert)
     if changed:
         issued.append(clean.ChangeRecipe({"invert": on}))
+    widgets.tooltip(
+        "What neither strength nor rules find; outside a box all goes as before.\n"
+        "For what is inside a box: Select, then Ctrl+I"
+    )
     return issued
 
 
