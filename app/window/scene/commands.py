@@ -248,8 +248,8 @@ class SceneArrived:
             return state
         room, views = self.room, self.info.views
         view = views.index(room.pose) if room.pose in views else None
-        state = state.with_editing(saved=room.saved).with_scene(unhidden=room.unhidden, shown_by=room.shown_by)
-        return state.with_scene(photos=room.photos, pose=room.pose, view=view)
+        state = state.with_editing(saved=room.saved).with_scene(photos=room.photos, pose=room.pose, view=view)
+        return state.with_scene(unhidden=room.unhidden, shown_by=room.shown_by)
 
     def _others(self, state: State) -> tuple[Room, ...]:
         return state.scene.rooms if self.replaces else _rooms(state, self.info)
