@@ -81,7 +81,7 @@ def _moved(atom: Tensor, name: str, denied: Sequence[str], known: Mapping[str, T
     if against:
         span = torch.linalg.qr(torch.stack(against, 1))[0]  # (C, n)
         said = span @ (span.T @ atom)
-        if not lone and float((atom - said).norm()) <= 1e-3:  # nothing but the other side of the words is left
+        if not lone and float((atom - said).norm()) <= 1e-3:  # only the words' other side is left
             return torch.zeros_like(atom)
         atom = atom - (2 if lone else REFUSED) * said
     return normalize(atom, dim=0) if float(atom.norm()) > 1e-3 else torch.zeros_like(atom)
