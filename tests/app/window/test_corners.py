@@ -8,6 +8,7 @@ from imgui_bundle import ImVec2, imgui
 
 from app.window.commands import Tick
 from app.window.dialogs import Dialog
+from app.window.editing.cleaning import ChangeRecipe
 from app.window.editing.panels import cleaning, history
 from app.window.editing.panels import pointing as card_panel
 from app.window.editing.state import Card, Floaters, Reading
@@ -28,7 +29,7 @@ from tests.app.window.headless import box, context, frames, look
 from tests.app.window.items import Items
 from tests.app.window.scenes import VIEWS, after, shown_scene
 from tests.app.window.test_small_windows import edited
-from tests.app.window.test_stumbles import items
+from tests.app.window.test_stumbles import Hands, items
 
 __all__ = ["items"]  # a fixture
 
@@ -58,6 +59,21 @@ def test_a_box_to_clean_up_outside_of_needs_no_scrolling() -> None:
         window = imgui.internal.find_window_by_name("Rules")
         assert window is not None and window.scroll_max.y == 0
         assert box("Rules")[3] <= 768
+
+
+def test_a_box_by_numbers_begins_around_the_scene(items: Items) -> None:
+    """It began with a unit each way, and half of the room was red."""
+    state = edited(floaters=replace(Floaters(bytes(4 * 12_300)), open=True))
+    info = state.scene.info
+    assert info is not None
+    state = state.with_scene(info=replace(info, extent=(Vector(-2, -1, 0.5), Vector(1, 1.5, 3))))
+    with context((1280, 800)):
+        theme.set_up(1.0, "dark")
+        hands = Hands(lambda seen: cleaning.draw(state, seen, *BIG))
+        hands.frames(4)
+        left, top, right, bottom = items.now()["By numbers"][0]
+        hands.click((left + right) / 2, (top + bottom) / 2)
+    assert ChangeRecipe({"crop": (-2, -1, 0.5, 1, 1.5, 3)}) in hands.issued
 
 
 @pytest.mark.parametrize("size", [(800, 500), (1280, 800)])
