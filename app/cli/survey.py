@@ -21,6 +21,9 @@ def run_survey(args: Namespace, phrases: Sequence[str], negatives: Sequence[str]
     if args.view is not None or args.camera or args.size or args.ortho or args.npz:
         raise InputError("--scenes chooses the views; leave out --view, --camera, --size, --ortho and --npz")
     paths = scene_files(args.scenes)
+    once: dict[str, str] = {}
+    for phrase in phrases:
+        once.setdefault(phrase.strip().lower(), phrase)
     check_folder(args.output)
     from langflash_core.colormaps import HeatColours
     from langflash_core.writing.survey import Reply, ask_scene, write_survey
@@ -45,7 +48,7 @@ def run_survey(args: Namespace, phrases: Sequence[str], negatives: Sequence[str]
             progress(f"scene {place + 1} of {len(paths)}", 0.95 * place / len(paths))
             name = path.relative_to(args.scenes).with_suffix("").as_posix()
             try:
-                replies += asked(teach(open_scene(path)), name, phrases)
+                replies += asked(teach(open_scene(path)), name, list(once.values()))
             except PromptError:  # of the phrases, so the next scene would say the same
                 raise
             except LangFlashError as error:

@@ -15,6 +15,7 @@ from langflash_core.geometry import poses
 from .asking.state import PROMPTS_SUFFIX
 from .dialogs import PROMPTS, RECIPES, Dialog
 from .editing.state import RECIPE_SUFFIX
+from .filming.state import Walk
 from .protocol import Command as Command
 from .scene import samples
 from .scene.drops import SCENE_SUFFIX, There, Typed
@@ -59,6 +60,8 @@ class Tick:
             flight = flight if fraction < 1.0 else None
         tour = state.filming.tour
         if tour is not None:
+            if isinstance(tour, Walk):
+                state = state.with_touring(place=tour.place(self.now))
             there = tour.at(self.now)
             pose, tour = (tour.poses[-1], None) if there is None else (there, tour)
         return replace(

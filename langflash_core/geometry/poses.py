@@ -389,6 +389,12 @@ def on_tour(stops: Sequence[Pose], passed: float) -> Pose:
     return blend(stops[here], stops[there], max(0.0, since - STAY) / FLIGHT)
 
 
+def tour_place(count: int, passed: float) -> int:
+    """The number of the stop where `on_tour` stays or flies to, of so many."""
+    place, since = divmod(max(passed, 0.0), STAY + FLIGHT)
+    return min(int(place) + (since > STAY), count - 1)
+
+
 def alike(all_poses: Sequence[Pose]) -> tuple[Pose, ...]:
     """As they are where all see by parallel rays, else all in perspective."""
     flat = all(pose.span is not None for pose in all_poses)

@@ -29,7 +29,7 @@ Render = Callable[..., Frame]  # (scene, camera, weight_maps=True)
 _RATIO = 0.8  # Lowe's, of matches
 _POINTS = 3000  # of a photo
 _LEAST, _AGREE = 12, 0.15  # matches that agree, and share of all: fewer do by chance
-_SCALES = (1.6, 2.5)  # up to which scenes in metres, guessed ones too, and others may differ
+_SCALES = (1.6, 2.5)  # up to which scenes in metres and others may differ; guessed ones too, if need be
 _NEAR = 0.12  # m: how well they agree
 _TRIES = 4000
 
@@ -59,19 +59,26 @@ class Fit:
 
 def aligned(first: Inventory, second: Inventory, render: Render) -> Fit:
     """Raises:
-    InputError: a scene holds no photos, or too few of their key points match.
+    InputError: a scene holds no photos, too few of their key points match, or lengths that were told for both
+        differ by too much.
     """
     for found in (first, second):
         if not found.scene.photos:
             raise InputError("scenes are compared by their photos, and one has none; name scenes of photos")
     ours, theirs = _matched(_described(first, render), _described(second, render))
-    most = _SCALES[0] if first.unit == second.unit == "m" else _SCALES[1]
-    fit = _fitted(ours, theirs, first.metre, most)
-    if fit is None or fit.matches < max(_LEAST, _AGREE * fit.tried):
-        raise InputError(
-            "the photos of both scenes show too little in common; take some from the same places"
-        )
-    return fit
+    metres = first.unit == second.unit == "m"
+    told = metres and not (first.guess or second.guess)
+    for most in _SCALES if metres else _SCALES[1:]:
+        fit = _fitted(ours, theirs, first.metre, most)
+        if fit is None or fit.matches < max(_LEAST, _AGREE * fit.tried):
+            continue
+        if told and most > _SCALES[0]:
+            times = max(fit.scale, 1 / fit.scale)
+            raise InputError(
+                f"lengths were told for both scenes, and they differ by {times:.1f} times; tell them again"
+            )
+        return fit
+    raise InputError("the photos of both scenes show too little in common; take some from the same places")
 
 
 def _described(found: Inventory, render: Render) -> tuple[np.ndarray, np.ndarray]:

@@ -1,14 +1,14 @@
 """What people teach a scene: names that groups answer to as well, and words that they no longer answer to.
 
-A lesson moves its atom: towards a name t, d' = normalise(d + t); out of a denied word u, d' = d - (d . u) u,
-whose cosine with u is 0. Atoms that look alike are moved along, all the way where they are the same and not
-at all from a cosine of `ALIKE` down:
+A lesson moves its atom: towards a name t, d' = normalise(d + t); out of a denied word u,
+d' = d - `REFUSED` (d . u) u: beyond a cosine of 0, since negatives may lie below that, too. Atoms that look
+alike are moved along, all the way where they are the same and not at all from a cosine of `ALIKE` down:
 
     d_j' = normalise(d_j + sum_k s_jk (d_k' - d_k)),
     s_jk = clamp((cos(d_j, d_k) - ALIKE) / (1 - ALIKE), 0, 1).
 
-A lone atom (`langflash_core.scene.lone`) is that of one part of a scene, and moves no other. Since negatives
-may lie below a cosine of 0 too, it goes as far to the other side, d' = d - 2 (d . u) u: nothing else is lost.
+A lone atom (`langflash_core.scene.lone`) is that of one part of a scene, and moves no other. It goes as far
+to the other side, d' = d - 2 (d . u) u: nothing else is lost.
 
 Source: own.
 """
@@ -27,6 +27,9 @@ from langflash_core.types import Record
 ALIKE = 0.9
 """Cosine of atoms from which a lesson about one is one about the other. In scenes of photos the groups of one
 thing lie above .95, a chair and a sofa below .8."""
+REFUSED = 1.25
+"""How far a group goes out of a denied word. In scenes of photos, with 1 one denial of twelve is not heeded;
+with 2 the group loses half of the other words that it answers (MEASURED.md, "A group that is not a word")."""
 
 
 def taught_dictionary(
@@ -77,5 +80,8 @@ def _moved(atom: Tensor, name: str, denied: Sequence[str], known: Mapping[str, T
     against = [known[text] for text in denied if text in known]
     if against:
         span = torch.linalg.qr(torch.stack(against, 1))[0]  # (C, n)
-        atom = atom - (2 if lone else 1) * span @ (span.T @ atom)
+        said = span @ (span.T @ atom)
+        if not lone and float((atom - said).norm()) <= 1e-3:  # only the words' other side is left
+            return torch.zeros_like(atom)
+        atom = atom - (2 if lone else REFUSED) * said
     return normalize(atom, dim=0) if float(atom.norm()) > 1e-3 else torch.zeros_like(atom)

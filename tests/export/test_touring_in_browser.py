@@ -86,6 +86,16 @@ def test_it_opens_at_its_start_and_goes_on_by_hand_and_key(opened):
     assert opened.value("document.getElementById('play').getAttribute('aria-label')") == "play the tour"
 
 
+def test_one_arrives_where_frames_come_late(opened):
+    """A full picture was drawn before each of them, and the clock of the flight began anew."""
+    late = "window.requestAnimationFrame = (next) => setTimeout(() => next(performance.now()), 400)"
+    opened.value(f"void ({late})")
+    opened.value("document.getElementById('next').click()")
+    until(opened, "langflash.then((page) => page.moving.flight === null)", 30)  # a tenth of it is needed
+    assert told(opened) == "Aside" and np.linalg.norm(place(opened)) > 0.2
+    until(opened, "langflash.then((page) => page.waiting === null && page.sharp)", 30)
+
+
 def test_notes_hide_behind_what_is_before_them_and_the_keyboard_reaches_them(opened):
     away = "[...document.querySelectorAll('#notes li')].map((item) => item.classList.contains('away'))"
     until(opened, f"String({away}) === 'false,true,false'")

@@ -11,6 +11,7 @@ from langflash_core.inventory import alignment, beside, inventory
 from langflash_core.inventory.alignment import Fit
 from langflash_core.inventory.beside import difference
 from langflash_core.language.spaces import language_space
+from langflash_core.records import Guess
 from langflash_core.splat import render
 from tests.boxroom import CHAIRS, METRES, TABLE, WORDS, box_room
 
@@ -40,6 +41,25 @@ def test_matches_that_agree_on_nothing_are_no_fit():
     fit = alignment._fitted(rng.uniform(-2, 2, (30, 3)), rng.uniform(-2, 2, (30, 3)), 1.0)
     assert fit is None or fit.matches < alignment._LEAST
     assert alignment._fitted(np.zeros((1, 3)), np.zeros((1, 3)), 1.0) is None
+
+
+@pytest.mark.parametrize("times", [1.8, 0.55])
+def test_a_wrong_guess_of_lengths_is_put_up_with_and_lengths_told_wrong_are_said(room, monkeypatch, times):
+    """A told scale beside a guess, 1.8 times off, was called too little in common."""
+    rng = np.random.default_rng(2)
+    theirs = rng.uniform(-2, 2, (60, 3))
+    ours = times * theirs + [0.5, 0.1, -1.0]
+    monkeypatch.setattr(alignment, "_described", lambda found, render: ())
+    monkeypatch.setattr(alignment, "_matched", lambda first, second: (ours, theirs))
+    seen = replace(room, scene=replace(room.scene, photos=(b"", b"")))
+    guessed = replace(seen, guess=Guess(2.0, 1.7, 2.4, ("door",)))
+    assert alignment.aligned(guessed, seen, render).scale == pytest.approx(times, abs=0.01)
+    assert alignment.aligned(seen, guessed, render).matches == 60
+    with pytest.raises(InputError, match=r"told for both scenes, and they differ by 1\.8 times"):
+        alignment.aligned(seen, seen, render)
+    monkeypatch.setattr(alignment, "_matched", lambda first, second: (ours, theirs[::-1]))
+    with pytest.raises(InputError, match="too little in common"):
+        alignment.aligned(guessed, seen, render)
 
 
 def test_three_changes_are_told_by_numbers(room, monkeypatch):

@@ -18,6 +18,7 @@ if TYPE_CHECKING:
     from langflash_core.inventory.beside import Difference, Pair
     from langflash_core.types import Scene
 
+_UNLIKE = 1.25  # times: more than guesses of lengths are said to be off
 FILES = (".html", ".csv", ".json", ".svg", ".dxf", ".langflash")
 
 
@@ -136,7 +137,9 @@ def _changes(changed: "Difference") -> list[str]:
         "stayed": [pair.before.title for pair in changed.stayed],
         "not known": [thing.title for thing in changed.unseen],
     }
-    matches = f"{changed.fit.matches} of {changed.fit.tried} matches agree"
+    matches, scale = f"{changed.fit.matches} of {changed.fit.tried} matches agree", changed.fit.scale
+    if max(scale, 1 / scale) > _UNLIKE:
+        matches += f"; its lengths are taken times {scale:.2f}, since the scales of the two differ"
     return ["", f"Beside the other scene ({matches}):"] + [
         f"  {name}: {', '.join(titles) or '-'}" for name, titles in lists.items()
     ]

@@ -1,5 +1,6 @@
 """The export dialog, and the export under way."""
 
+import math
 from dataclasses import replace
 
 from imgui_bundle import ImVec2, imgui
@@ -28,7 +29,18 @@ SIDES = (512, 1024, 1600, 2048, 4096)
 
 
 def draw(state: State, look: Look) -> list[do.Command]:
-    """The dialog's body."""
+    """The dialog's body; in a low window it scrolls, and its buttons stay."""
+    room = widgets.above_buttons(look.px(24), look.px(60))
+    flags = imgui.ChildFlags_.auto_resize_y | imgui.ChildFlags_.nav_flattened  # keys walk in and out
+    imgui.set_next_window_size_constraints(ImVec2(0, 0), ImVec2(math.inf, room))
+    imgui.begin_child("##form", ImVec2(0, 0), flags)
+    issued = _form(state, look)
+    imgui.end_child()
+    return issued + _buttons(state, look)
+
+
+def _form(state: State, look: Look) -> list[do.Command]:
+    """What is wanted, and the command that it is."""
     form = state.exporting.form
     wanted = _kinds(form, look)
     widgets.muted(form.what.tip)
@@ -117,20 +129,25 @@ def _narrowed(state: State, form: ExportForm, look: Look) -> ExportForm:
 
 
 def _order(state: State, look: Look) -> list[do.Command]:
-    """The command that will run, and the button that runs it."""
-    issued: list[do.Command] = []
+    """The command that will run, or why there is none."""
     order = written.order(state)
-    busy = state.exporting.running is not None
     if isinstance(order, str):
         widgets.muted(order)
-    else:
-        widgets.muted("The same on the command line:")
-        _command_line(order.line, look)
-        issued += _copy(order.line)
-        for remark in written.remarks(state):
-            widgets.muted(remark)
+        return []
+    widgets.muted("The same on the command line:")
+    _command_line(order.line, look)
+    issued = _copy(order.line)
+    for remark in written.remarks(state):
+        widgets.muted(remark)
     widgets.gap(look.px(4))
-    imgui.begin_disabled(isinstance(order, str) or busy)
+    return issued
+
+
+def _buttons(state: State, look: Look) -> list[do.Command]:
+    """What runs it, and what closes the dialog."""
+    issued: list[do.Command] = []
+    busy = state.exporting.running is not None
+    imgui.begin_disabled(isinstance(written.order(state), str) or busy)
     if widgets.primary_button("Export", look.vec(120, 0)):
         issued.append(export.Export())
     imgui.end_disabled()

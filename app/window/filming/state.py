@@ -4,7 +4,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from langflash_core.geometry.poses import Pose, alike, on_tour, read_pose, told_pose, tour_seconds
+from langflash_core.geometry.poses import Pose, alike, on_tour, read_pose, told_pose, tour_place, tour_seconds
 
 MOST_KEYS = 50
 WAYS = (
@@ -41,6 +41,10 @@ class Walk:
         """Where it is; None at its end."""
         passed = now - self.began
         return on_tour(alike(self.poses), passed) if passed < tour_seconds(len(self.poses)) else None
+
+    def place(self, now: float) -> int:
+        """The number of the stop that is shown, or flown to."""
+        return tour_place(len(self.poses), now - self.began)
 
 
 @dataclass(frozen=True)

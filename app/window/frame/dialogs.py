@@ -230,11 +230,12 @@ def help_rows(group: str | None) -> list[tuple[str, str]]:
     keyed = (entry for entry in table.ENTRIES if entry.group == group and entry.keys)
     for family, alike in groupby(keyed, lambda each: each.name.partition(": ")[0]):
         first, *others = alike
-        keys, meaning = ", ".join(map(str, first.keys)), first.name
         if others:
-            keys += f" to {others[-1].key}"
-            meaning += others[-1].name.replace(f"{family}: ", " to ")
-        rows.append((keys, meaning))
+            meaning = first.name + others[-1].name.replace(f"{family}: ", " to ")
+            ends = zip(first.keys, others[-1].keys, strict=False)
+            rows += [(f"{start} to {end}", meaning) for start, end in ends]
+        else:
+            rows.append((", ".join(map(str, first.keys)), first.name))
     return rows
 
 

@@ -7,7 +7,7 @@ from imgui_bundle import imgui
 
 from ..kit import theme, widgets
 from ..kit.look import Look
-from ..scene.near import FADING, degrees_from_photos
+from ..scene.near import FADING, degrees_from_photos, flown_past
 from ..scene.state import said as in_words
 from ..state import State
 
@@ -39,7 +39,9 @@ def figures(state: State) -> list[str]:
     if state.scene.job is not None:  # its bar is at the panel's top, which may be scrolled away or covered
         said.insert(0, f"{state.scene.job.title}: {in_words(state.scene.job.stage)}")
     aside = degrees_from_photos(state)
-    if aside > FADING:
+    if flown_past(state):
+        said.insert(0, "the scene lies behind you: H flies back")
+    elif aside > FADING:
         said.append(f"{aside:.0f} degrees aside of the photos: less is known here")
     if state.scene.info is not None:
         width, height = stats.picture_size

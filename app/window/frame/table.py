@@ -61,7 +61,8 @@ class Chord:
 
     def __str__(self) -> str:
         held = "Ctrl+" * self.ctrl + "Shift+" * self.shift
-        return held + _SIGNS.get(self.key, str(self.key.name).strip("_").upper())
+        sign = _SIGNS.get(self.key, str(self.key.name).strip("_").upper())
+        return held + ("Comma" if sign == "," and not held else sign)
 
 
 @dataclass(frozen=True)

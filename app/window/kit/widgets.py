@@ -13,6 +13,7 @@ PLAIN = imgui.WindowFlags_.no_decoration | imgui.WindowFlags_.no_move | imgui.Wi
 NO_KEYS = imgui.WindowFlags_.no_nav  # for windows that Tab and the arrows pass by
 _Value = TypeVar("_Value")
 _FOLDER = 1.3  # of a frame's height: the icon is wider than high
+_WIDEST = 26.0  # of a line of a tooltip, in sizes of the font
 
 
 @contextmanager
@@ -161,6 +162,26 @@ def tooltip(text: str) -> None:
         imgui.HoveredFlags_.for_tooltip | imgui.HoveredFlags_.allow_when_disabled
     ):
         imgui.set_tooltip(text)
+
+
+def above_buttons(margin: float, least: float) -> float:
+    """How high the part of a dialog from here on may be, for a row of buttons to be seen below it; pixels.
+    margin: between the highest dialog and the window's edges, both together."""
+    style, place = imgui.get_style(), imgui.get_cursor_pos_y()
+    below = imgui.get_frame_height() + style.item_spacing.y + style.window_padding.y
+    return max(imgui.get_io().display_size.y - margin - place - below, least)
+
+
+def whole(text: str, tip: str) -> None:
+    """Explain the last item, a field; all that stands in it where that is too long for it to show."""
+    padding = imgui.get_style().frame_padding.x
+    if imgui.calc_text_size(text).x <= imgui.get_item_rect_size().x - 2 * padding:
+        tooltip(tip)
+    elif imgui.begin_item_tooltip():
+        imgui.push_text_wrap_pos(_WIDEST * imgui.get_font_size())
+        imgui.text_unformatted(text)
+        imgui.pop_text_wrap_pos()
+        imgui.end_tooltip()
 
 
 def shortened(text: str, width: float) -> str:

@@ -246,9 +246,10 @@ class SceneArrived:
         state = self._shown(state).with_scene(rooms=self._others(state))
         if self.room is None:
             return state
-        state = state.with_editing(saved=self.room.saved)
-        hidden = {"unhidden": self.room.unhidden, "shown_by": self.room.shown_by}
-        return state.with_scene(photos=self.room.photos, pose=self.room.pose, view=None, **hidden)
+        room, views = self.room, self.info.views
+        view = views.index(room.pose) if room.pose in views else None
+        state = state.with_editing(saved=room.saved).with_scene(photos=room.photos, pose=room.pose, view=view)
+        return state.with_scene(unhidden=room.unhidden, shown_by=room.shown_by)
 
     def _others(self, state: State) -> tuple[Room, ...]:
         return state.scene.rooms if self.replaces else _rooms(state, self.info)

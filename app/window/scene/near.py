@@ -2,6 +2,8 @@
 
 import math
 
+import numpy as np
+
 from langflash_core.geometry import poses
 from langflash_core.geometry.poses import Pose, Vector
 
@@ -49,6 +51,16 @@ def degrees_from_photos(state: State) -> float:
     """Of what is looked at, between here and the nearest place to keep to; 0 where there is none."""
     places = places_to_keep_to(state)
     return poses.degrees_aside(state.scene.pose, places) if places else 0.0
+
+
+def flown_past(state: State) -> bool:
+    """Whether nearly all of the scene lies behind who looks, as after a flight through it."""
+    info, pose = state.scene.info, state.scene.pose
+    if info is None or info.extent is None or pose.span is not None:
+        return False
+    forward = pose.axes[:, 2]
+    farthest = np.where(forward > 0, info.extent[1], info.extent[0])  # corner of the box
+    return float(forward @ (farthest - np.array(pose.centre))) < 0
 
 
 def orbited(state: State, pose: Pose, yaw: float, pitch: float) -> Pose:

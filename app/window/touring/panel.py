@@ -6,7 +6,7 @@ from imgui_bundle import ImVec2, ImVec4, imgui
 from imgui_bundle import icons_fontawesome_6 as fa
 
 from langflash_core.geometry import poses
-from langflash_core.scene.tour import Note, Stop
+from langflash_core.scene.tour import LONGEST_NAME, LONGEST_TEXT, Note, Stop
 
 from .. import commands as do
 from ..filming import commands as film
@@ -101,8 +101,9 @@ def _stop(state: State, number: int, stop: Stop, look: Look) -> list[do.Command]
     imgui.set_next_item_width(imgui.get_content_region_avail().x - 4 * (look.px(_BUTTON) + gap))
     _, name = imgui.input_text("##name", stop.name)
     if imgui.is_item_deactivated_after_edit() and name != stop.name:
-        issued.append(tour.ChangeStop(number, name=name))
-    widgets.tooltip("Its name")
+        name, told = _cut(name, LONGEST_NAME, "A stop's name")
+        issued += [tour.ChangeStop(number, name=name), *told]
+    widgets.whole(stop.name, "Its name")
     start, last = state.tour.start == stop.name, len(state.tour.stops) - 1
     for icon, tip, command, can in (
         (fa.ICON_FA_FLAG, "Pages open at the first photo" if start else "Pages of the scene open here",
@@ -129,7 +130,15 @@ def _told(number: int, stop: Stop) -> list[do.Command]:
     imgui.set_next_item_width(-1)
     _, text = imgui.input_text_with_hint("##text", "what is told here", stop.text)
     changed = imgui.is_item_deactivated_after_edit() and text != stop.text
-    return [tour.ChangeStop(number, text=text)] if changed else []
+    widgets.whole(stop.text, "")
+    text, told = _cut(text, LONGEST_TEXT, "What is told at a stop")
+    return [tour.ChangeStop(number, text=text), *told] if changed else []
+
+
+def _cut(text: str, most: int, what: str) -> tuple[str, list[do.Command]]:
+    """As much of what was typed as there is room for; refused, all of it would be lost."""
+    told = do.Notify(f"{what} has at most {most} letters; the rest of it was left out.", "info")
+    return text.strip()[:most], [told] if len(text.strip()) > most else []
 
 
 def _note(state: State, number: int, note: Note, look: Look) -> list[do.Command]:
@@ -146,7 +155,9 @@ def _note(state: State, number: int, note: Note, look: Look) -> list[do.Command]
     imgui.set_next_item_width(imgui.get_content_region_avail().x - look.px(_BUTTON) - gap)
     _, text = imgui.input_text("##text", note.text)
     if imgui.is_item_deactivated_after_edit() and text != note.text:
-        issued.append(tour.ChangeNote(number, text))
+        text, told = _cut(text, LONGEST_TEXT, "A note")
+        issued += [tour.ChangeNote(number, text), *told]
+    widgets.whole(note.text, "")
     imgui.same_line(0, gap)
     if imgui.button(f"{fa.ICON_FA_TRASH}##gone", wide):
         issued.append(tour.RemoveNote(number))

@@ -327,8 +327,13 @@ class Page {
     this.plan.here(this.orbit);
   }
 
-  // The camera stands still: all pixels, and scores.
+  // The camera stands still: all pixels, and scores. Not while it flies and the next frame is late: a full
+  // picture before every frame would keep slow machines from ever getting anywhere.
   rest() {
+    if (this.moving.busy) {
+      this.resting = setTimeout(() => this.rest(), REST);
+      return;
+    }
     this.last = undefined;
     this.draw(1, true);
     this.embedding.camera();

@@ -108,6 +108,10 @@ class Moving {
   step(elapsed) {
     if (this.flight) this.soar(elapsed);
     for (const code of this.pressed) this.held(KEYS[code], elapsed / 1000);
+    return this.busy;
+  }
+
+  get busy() {
     return this.flight !== null || this.pressed.size > 0;
   }
 

@@ -85,6 +85,7 @@ def plan_svg(plan: Plan, title: str, *, headed: bool = True) -> str:
         *_sizes(paper, plan),
         _list(plan, 2 * _EDGE + wide * per, listed),
         _bar(paper, plan, _TOP + 2 * _EDGE + high * per + 4),
+        _stood(plan, _TOP + 2 * _EDGE + high * per + 10),
         _arrow(2 * _EDGE + wide * per - 6, _TOP + 4),
         "</svg>",
     ]
@@ -163,7 +164,7 @@ def _across(start: Place, end: Place, length: float) -> tuple[float, float]:
 
 def _eye(paper: _Paper, eye: Place, number: int) -> str:
     x, y = paper.at(eye)
-    return f'<circle class="eye" cx="{x:.2f}" cy="{y:.2f}" r=".7"><title>Photo {number}</title></circle>'
+    return f'<circle class="eye" cx="{x:.2f}" cy="{y:.2f}" r=".7"><title>Photo {number + 1}</title></circle>'
 
 
 def _sizes(paper: _Paper, plan: Plan) -> list[str]:
@@ -223,6 +224,16 @@ def _bar(paper: _Paper, plan: Plan, y: float) -> str:
         for k in range(2)
     ]
     return "".join(halves) + f'<text class="note" x="{x + full + 1.5:.2f}" y="{y + 1.2:.2f}">1 m</text>'
+
+
+def _stood(plan: Plan, y: float) -> str:
+    """What the dots are."""
+    if not plan.eyes:
+        return ""
+    return (
+        f'<circle class="eye" cx="{_EDGE + 0.7}" cy="{y:.2f}" r=".7"/>'
+        f'<text class="note" x="{_EDGE + 2.5}" y="{y + 0.9:.2f}">where the photos were taken</text>'
+    )
 
 
 def _arrow(x: float, y: float) -> str:

@@ -92,5 +92,5 @@ def _row(thing: Thing, number: int | None, cutout: str | None, found: Inventory)
         f"<td>{escape(thing.title)}{own}{maybe}</td>"
         f'<td class="size">{size(thing, found.unit)}{cut}</td><td class="place">{where}{above}</td>'
         f'<td><div class="bar"><i style="width:{100 * thing.sure:.0f}%"></i></div>{thing.sure:.0%}</td>'
-        f'<td class="photos">{", ".join(map(str, thing.photos))}</td></tr>\n'
+        f'<td class="photos">{", ".join(str(view + 1) for view in thing.photos)}</td></tr>\n'
     )

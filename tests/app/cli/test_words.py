@@ -84,6 +84,14 @@ def test_phrases_of_many_scenes_in_one_table(run, folder, tmp_path):
     assert "deep/broken" in page and "<script" not in page
 
 
+def test_a_phrase_that_stands_there_twice_is_asked_once(run, folder, tmp_path):
+    """It was "found in 6 of 6 scenes" of a folder of three."""
+    asked = ("armchair", "wall", "Armchair", "armchair")
+    outcome = run("query", "--scenes", folder, *asked, "-o", tmp_path / "out", "--json", *TORCH)
+    rows = outcome.json()["prompts"]
+    assert [(row["prompt"], len(row["scenes"])) for row in rows] == [("armchair", 3), ("wall", 3)]
+
+
 def test_words_that_do_not_go_together_are_one_sentence(run, folder, tmp_path):
     empty = tmp_path / "none.txt"
     empty.write_text("# nothing\n")

@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from imgui_bundle import ImVec2, imgui
@@ -20,7 +21,7 @@ from ..cleaning import ABOVE, BELOW, Condition
 from ..state import Floaters
 
 _WIDE, _TOP, _MARGIN = 360.0, 150.0, 12.0  # design pixels; _TOP: below the axes
-_HIGH = 460.0  # at the most
+_HIGH = 530.0  # at the most; of what a box needs
 _NAME, _SIDE, _VALUE = 106.0, 76.0, 80.0
 _NAMES = {
     "confidence": "Sureness", "size": "Size", "opacity": "Opacity", "depth": "Distance",
@@ -53,7 +54,7 @@ def draw(state: State, look: Look, place: ImVec2, size: ImVec2) -> list[do.Comma
     issued: list[do.Command] = []
     shown, kept = imgui.begin("Rules", True, flags)
     if shown:
-        for part in (_kinds, _rules, _limits, _crop, _files):
+        for part in (_kinds, _rules, _limits, partial(_crop, around=_around(state)), _files):
             issued += part(preview, look)
     imgui.end()
     imgui.pop_style_var()
@@ -182,14 +183,26 @@ def _limits(preview: Floaters, look: Look) -> list[do.Command]:
     changed, on = widgets.checkbox("All the rest instead", preview.recipe.invert)
     if changed:
         issued.append(clean.ChangeRecipe({"invert": on}))
+    widgets.tooltip(
+        "What neither strength nor rules find; outside a box all goes as before.\n"
+        "For what is inside a box: Select, then Ctrl+I"
+    )
     return issued
 
 
-def _crop(preview: Floaters, look: Look) -> list[do.Command]:
+def _around(state: State) -> Box:
+    """Nearly all of the scene: where a box of one's own begins."""
+    info = state.scene.info
+    if info is None or info.extent is None:
+        return (-1.0, -1.0, -1.0, 1.0, 1.0, 1.0)
+    return _in_order(*info.extent, low_moves=False)
+
+
+def _crop(preview: Floaters, look: Look, around: Box) -> list[do.Command]:
     """The box outside of which all goes."""
     crop, issued = preview.recipe.crop, []
     imgui.separator_text("Outside a box")
-    own: tuple[str | Box | None, ...] = ((preview.box or (-1.0, -1.0, -1.0, 1.0, 1.0, 1.0)),)
+    own: tuple[str | Box | None, ...] = ((preview.box or around),)
     options = [("Stays", None), *((name.capitalize(), name) for name in PRESETS), ("By numbers", own[0])]
     chosen = widgets.choice(options, crop)
     if chosen != crop:

@@ -9,7 +9,7 @@ from ...kit.look import Look
 from ...state import State
 from .. import commands as edit
 
-_ROWS = 7.5  # shown at once; the half tells that there are more
+_ROWS, _LEAST = 7.5, 3.5  # shown at once, at the most and at the least; the half tells that there are more
 
 
 def draw(state: State, look: Look) -> list[do.Command]:
@@ -31,7 +31,10 @@ def draw(state: State, look: Look) -> list[do.Command]:
         *(e.label for e in history.done),
         *(e.label for e in reversed(history.undone)),
     ]
-    height = min(len(labels), _ROWS) * imgui.get_text_line_height_with_spacing() + look.px(8)
+    line, room = imgui.get_text_line_height_with_spacing(), imgui.get_content_region_avail().y - look.px(8)
+    # No more than the panel has room for, or the present one is below its end.
+    rows = min(len(labels), max(_LEAST, min(_ROWS, room / line)))
+    height = rows * line + look.px(8)
     imgui.begin_child("##edits", ImVec2(0, height))
     now = len(history.done)
     for position, label in enumerate(labels):

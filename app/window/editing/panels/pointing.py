@@ -12,7 +12,7 @@ from langflash_core.geometry import poses
 from langflash_core.geometry.poses import Vector
 
 from ... import commands as do
-from ...kit import theme, widgets
+from ...kit import boxes, theme, widgets
 from ...kit.look import Look
 from ...state import State
 from ...touring import commands as tour
@@ -21,6 +21,7 @@ from .. import pointing as point
 from ..state import PICK_RADIUS, Card, Point, Reading, Tool
 
 _CARD = 312.0  # design pixels wide
+_HIGH = 360.0  # before it was drawn
 _SHOWN_WORDS = 5
 
 
@@ -169,7 +170,9 @@ def _card(state: State, card: Card, look: Look, place: ImVec2, size: ImVec2) -> 
             if at.x + look.px(_CARD + 30) < place.x + size.x
             else at.x - look.px(_CARD + 18)
         )
-        y = min(max(at.y - look.px(40), place.y + look.px(12)), place.y + size.y - look.px(330))
+        before = boxes.window_box("##card")
+        high = look.px(_HIGH) if before is None else before[3] - before[1]
+        y = min(at.y - look.px(40), place.y + size.y - high - look.px(8))
         corner = ImVec2(x, max(y, place.y + look.px(12)))
     imgui.set_next_window_pos(corner)
     imgui.set_next_window_size(ImVec2(look.px(_CARD), 0))

@@ -35,7 +35,8 @@ def draw(state: State, look: Look) -> list[do.Command]:
     else:
         issued += _way(folder, look)
     shape = imgui.ChildFlags_.borders | imgui.ChildFlags_.nav_flattened  # keys walk in without a key for it
-    imgui.begin_child("##files", ImVec2(0, look.px(_HEIGHT)), shape)
+    height = min(look.px(_HEIGHT), widgets.above_buttons(look.px(24), look.px(60)))
+    imgui.begin_child("##files", ImVec2(0, height), shape)
     if folder is not None:
         if _walked(folder) and imgui.get_io().nav_visible:  # what had the keys went with the folder before
             imgui.set_keyboard_focus_here()

@@ -97,6 +97,9 @@ def test_help_fits_a_window_of_800_lines() -> None:
         assert window is not None and window.scroll_max.y == 0
     assert ("1 to 0", "Show: RGB to Features") in dialogs.help_rows("View")
     assert ("Ctrl+Z", "Undo") in dialogs.help_rows("Edit")
+    assert ("Comma, Num 5", "Parallel rays (orthographic), or perspective") in dialogs.help_rows("View")
+    turns = [keys for keys, meaning in dialogs.help_rows("View") if meaning.startswith("Orbit")]
+    assert turns == ["Num 4 to Num 2", "Ctrl+Shift+Left to Ctrl+Shift+Down"], "each kind of key its row"
 
 
 @pytest.mark.parametrize("scale", [1.0, 1.5])
