@@ -202,7 +202,18 @@ def test_the_late_half_is_trained_and_exported(run, checkpoint, photos, tmp_path
             (photos / folder / f"{number}{content.suffix}").write_bytes(content.read_bytes())
     rooms = [toy_record(seed) for seed in (0, 1)]
     write_shard(tmp_path / "cache" / "train" / "a.safetensors", rooms)
-    words = ("--photos", photos, "--minutes", "5", "--max-steps", "2", "--start", checkpoint)
+    words = (
+        "--photos",
+        photos,
+        "--minutes",
+        "5",
+        "--max-steps",
+        "2",
+        "--pictures",
+        "3",
+        "--start",
+        checkpoint,
+    )
     outcome = run("train", "late", tmp_path / "cache", "-o", tmp_path / "run", *words)
     assert outcome.code == 0 and "2 steps" in outcome.out, outcome.err
     out = tmp_path / "w.safetensors"
@@ -220,7 +231,18 @@ def test_the_late_half_goes_on_with_other_photos(run, checkpoint, photos, tmp_pa
             (photos / folder / f"{number}{content.suffix}").write_bytes(content.read_bytes())
     write_shard(tmp_path / "cache" / "train" / "a.safetensors", [toy_record(0)])
     assert run("train", "photos", "plain", photos / "images", "-o", tmp_path / "plain").code == 0
-    words = ("--photos", photos, "--more", tmp_path / "plain", "--minutes", "5", "--max-steps", "1")
+    words = (
+        "--photos",
+        photos,
+        "--more",
+        tmp_path / "plain",
+        "--minutes",
+        "5",
+        "--max-steps",
+        "1",
+        "--pictures",
+        "2",
+    )
     where = ("-o", tmp_path / "run", "--start", checkpoint)
     outcome = run("train", "late", tmp_path / "cache", *words, *where)
     assert outcome.code == 0 and "1 steps" in outcome.out, outcome.err

@@ -75,7 +75,7 @@ def test_the_grouping_learns_from_them(folders, words, network):
     optimiser = torch.optim.Adam(net.grouping.parameters(), lr=1e-3)
     photos, losses = outlined_set(folders), []
     batch = photos.draw(2, 1, torch.Generator().manual_seed(1))
-    for _ in range(6):
+    for _ in range(3):
         optimiser.zero_grad()
         loss = grouping_stage(net, batch, words).total
         loss.backward()
