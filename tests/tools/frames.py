@@ -158,9 +158,9 @@ def walk(someone: Watched, phrase: str) -> Iterator[tuple[str, float]]:
     for what in ("Mask", "Boxes, JSON", "Cut-out"):
         someone.xdotool("key", "Escape", "sleep", "0.3", "key", "ctrl+e")
         someone.until(lambda s: s["dialog"] == "export", "the dialog")
-        someone.xdotool("click", "--repeat", "30", "4", "sleep", "0.4")  # a small window's dialog scrolls
+        middle = (str(side // 2) for side in someone.size)  # a small window's dialog scrolls there
+        someone.xdotool("mousemove", *middle, "sleep", "0.4", "click", "--repeat", "30", "4", "sleep", "0.4")
         someone.click(what)
-        someone.xdotool("sleep", "0.4", "click", "--repeat", "30", "5", "sleep", "0.4")
         someone.click("Export")
         someone.until(lambda s: s["exporting"], f"the export {what}")
         began = time.perf_counter()
