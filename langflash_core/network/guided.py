@@ -195,11 +195,17 @@ class GuidedDepthNet(LangFlashNet):
             features = self.language(tokens, images)
         if tokens.shape[1] > FEW:
             return self._parts_of_many(tokens, images, size, features[0])
+        whole, finest = self.wholes(tokens, images)
+        return split_groups(whole, finest, self.preset.splitting, size, features[0].float())
+
+    def wholes(
+        self, tokens: Tokens, images: Float[Tensor, "B V 3 H W"]
+    ) -> tuple[Float[Tensor, "V K h w"], Float[Tensor, "V f h w"]]:
+        """The surviving groups of one scene (B = 1), uncut, and the map that they are read from."""
         memories, finest = self.semantic_maps(tokens, images)
         groups = self.grouping(memories, finest, tokens.shape[1])[-1]
         survivors = surviving(groups, self.preset.tau_exist)
-        whole = group_weights(groups, survivors, (finest.shape[-2], finest.shape[-1]))
-        return split_groups(whole, finest, self.preset.splitting, size, features[0].float())
+        return group_weights(groups, survivors, (finest.shape[-2], finest.shape[-1])), finest
 
     def _parts_of_many(
         self, tokens: Tokens, images: Tensor, size: tuple[int, int], features: Tensor

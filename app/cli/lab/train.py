@@ -191,6 +191,8 @@ def _run(args: Namespace, out: TextIO) -> None:
         raise InputError(f"there is no folder {args.cache}; make it with langflash train cache")
     if args.labels is not None and args.scenes is None:
         raise InputError("--labels are of clips; name their folder with --scenes")
+    if args.outlined and args.scenes is not None:
+        raise InputError("--scenes takes the place of rooms and of photos beside them; leave out --outlined")
     scenes = None if args.scenes is None else _source(args)
     if args.sam_teacher is not None:
         readable_file(args.sam_teacher, "checkpoint of MobileSAM", WeightsError)
@@ -201,6 +203,10 @@ def _run(args: Namespace, out: TextIO) -> None:
         if args.sam_teacher is not None and not any(plan.stage.dense for plan in recipe.plans):
             raise InputError(
                 "no stage here regresses SAM's embedding; name grouping, or leave --sam-teacher away"
+            )
+        if args.outlined and not any(plan.stage.name == "grouping" for plan in recipe.plans):
+            raise InputError(
+                "no stage here learns from outlined photos; name grouping, or leave --outlined out"
             )
         encode = language_space(PRESETS[recipe.preset].space).encode
         start = _start_of(args, recipe.preset)
@@ -228,7 +234,7 @@ def _source(args: Namespace) -> SceneSource:
     return source_at(args.scenes, args.labels)
 
 
-_OF_RECIPES = {"seed": 0, "batches": None, "precision": "auto"}
+_OF_RECIPES = {"seed": 0, "batches": None, "precision": "auto", "rate": None, "pictures": None}
 """Words that a recipe decides, and what they are where nobody says them."""
 
 

@@ -13,7 +13,6 @@ from dataclasses import dataclass, fields
 import numpy as np
 import torch
 from jaxtyping import Float64, Integer
-from torch.nn import functional as F
 
 from langflash_core.lab.evaluation.borders import UNKNOWN, border_f1
 from langflash_core.lab.evaluation.numbers import rounded
@@ -23,8 +22,8 @@ from langflash_core.lab.photos.fitting import fitted, network_size
 from langflash_core.lab.training.measures import nan_mean
 from langflash_core.lab.training.outlined import Outlined
 from langflash_core.network.guided import GuidedDepthNet
-from langflash_core.network.semantics.grouping import group_weights, surviving
 from langflash_core.network.semantics.splitting import split_groups
+from langflash_core.network.stereo.prior import resize
 from langflash_core.running import Progress
 
 SMALLEST = 0.0008
@@ -87,16 +86,16 @@ def regions_found(
     """Groups and parts of one photo (1, 1, 3, h, w), each (H, W) int64."""
     tokens = network.encode(images, Ks)
     features = network.language(tokens, images)
-    memories, finest = network.semantic_maps(tokens, images)
-    groups = network.grouping(memories, finest, 1)[-1]
-    survivors = surviving(groups, network.preset.tau_exist)
-    whole = group_weights(groups, survivors, (finest.shape[-2], finest.shape[-1]))
+    whole, finest = network.wholes(tokens, images)
     parts = split_groups(whole, finest, network.preset.splitting, photo_size, features[0].float())
-    large = F.interpolate(whole, photo_size, mode="bilinear", align_corners=False)
-    return tuple(
-        maps[0].argmax(0).numpy() if maps.shape[1] else np.zeros(photo_size, dtype=np.int64)
-        for maps in (large, parts)
-    )  # type: ignore[return-value]
+    return _likeliest(resize(whole, photo_size)), _likeliest(parts)
+
+
+def _likeliest(weights: torch.Tensor) -> np.ndarray:
+    """Of one view's weights (1, K, H, W); 0 everywhere where K is 0."""
+    if weights.shape[1] == 0:
+        return np.zeros(weights.shape[-2:], dtype=np.int64)
+    return weights[0].argmax(0).numpy()
 
 
 def grouping_scores(

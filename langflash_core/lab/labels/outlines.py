@@ -14,6 +14,7 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import UInt8, UInt16
 
+from langflash_core.errors import InputError
 from langflash_core.lab.labels.masks import cleaned, painted, without_gaps, without_parts, without_repeats
 from langflash_core.lab.labels.protocols import MaskProposer
 from langflash_core.lab.photos import PhotoFolder
@@ -66,6 +67,11 @@ def outlined(folder: PhotoFolder, id: str) -> LabelledPhoto:
     """A photo of such a folder with its map.
 
     Raises:
-        InputError: the map is missing or damaged.
+        InputError: the map is missing, damaged, or of another size.
     """
-    return replace(folder.photo(id), labels=folder.stored_labels(id))
+    photo, labels = folder.photo(id), folder.stored_labels(id)
+    if labels.shape != photo.image.shape[:2]:
+        raise InputError(
+            f"the outlines of photo {id} in {folder.root} have another size than the photo; outline it again"
+        )
+    return replace(photo, labels=labels)

@@ -13,6 +13,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from langflash_core.errors import InputError
 from langflash_core.lab.labels.outlines import outlined
 from langflash_core.lab.photos import PhotoFolder, chosen_ids
 from langflash_core.lab.photos.fitting import drawn_window, fitted
@@ -107,6 +108,13 @@ def _windows(
 
 
 def outlined_set(folders: Sequence[PhotoFolder]) -> OutlinedSet:
-    """Of each folder what `split` does not keep; folders count by the root of their photos' number."""
+    """Of each folder what `split` does not keep; folders count by the root of their photos' number.
+
+    Raises:
+        InputError: a folder is neither named nor outlined.
+    """
+    for folder in folders:
+        if not folder.labelled and not (folder.root / "labels").is_dir():
+            raise InputError(f"{folder.root} is neither named nor outlined; outline it with train outlines")
     rows = [(folder, chosen_ids(folder.ids, "train")) for folder in folders]
     return OutlinedSet(tuple(Outlined(folder, ids, len(ids) ** 0.5) for folder, ids in rows))

@@ -420,6 +420,12 @@ def test_a_walk_is_judged_kept_and_judged_beside_itself(run, checkpoint, tmp_pat
         (["train", "outlines", "PHOTOS", "-o", "out", "--weights", "gone.pt"], "no checkpoint of MobileSAM"),
         (["train", "outlines", "PHOTOS", "-o", "out"], "--weights"),
         (["eval", "grouping", "gone"], "there is no folder gone/images"),
+        (["train", "run", ".", "-o", "o", "--scenes", ".", "--outlined", "PHOTOS"], "leave out --outlined"),
+        (
+            ["train", "run", ".", "-o", "o", "--stages", "depth", "--minutes", "1", "--outlined", "PHOTOS"],
+            "no stage here learns from outlined photos",
+        ),
+        (["train", "run", ".", "-o", "o", "--recipe", "paper", "--rate", "1"], "what --rate is"),
         (["train", "photos", "voc", "gone", "-o", "out"], "invalid choice"),
     ],
 )

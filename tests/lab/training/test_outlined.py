@@ -3,7 +3,9 @@
 import numpy as np
 import pytest
 import torch
+from PIL import Image
 
+from langflash_core.errors import InputError
 from langflash_core.lab.photos import open_folder
 from langflash_core.lab.photos.writing import FolderWriter
 from langflash_core.lab.training.outlined import Outlined, OutlinedSet, outlined_set
@@ -68,6 +70,16 @@ def test_what_is_kept_to_judge_is_not_drawn(folders):
     assert len(learned) == sum(len(one.ids) for one in learned.folders) < 32
     parts = [learned.part(number, 2) for number in range(2)]
     assert sum(map(len, parts)) == len(learned)
+
+
+def test_photos_without_names_or_outlines_of_their_size_are_refused(folders, tmp_path):
+    outlined = folders[0].root / "labels"
+    Image.fromarray(np.ones((30, 40), np.uint16)).save(outlined / "0.png")
+    with pytest.raises(InputError, match="another size"):
+        Outlined(folders[0], ("0",), 1.0).photo(0)
+    outlined.rename(tmp_path / "elsewhere")
+    with pytest.raises(InputError, match="neither named nor outlined"):
+        outlined_set(folders)
 
 
 def test_the_grouping_learns_from_them(folders, words, network):
