@@ -10,7 +10,16 @@ from torch import Tensor
 
 from langflash_core.geometry.cameras import intrinsics_from_fov, invert_rigid, rays, transform, unproject
 from langflash_core.scene import ownership
-from langflash_core.scene.ownership import BEFORE, BEHIND, covered, filled, from_the_middle, owned
+from langflash_core.scene.ownership import (
+    BEFORE,
+    BEHIND,
+    covered,
+    filled,
+    from_the_middle,
+    owned,
+    owners,
+    spread,
+)
 
 HEIGHT, WIDTH = 24, 32
 WALL = (0.0, 0.0, 1.0), 3.0  # n x = d, in the world
@@ -162,6 +171,31 @@ def test_photos_come_from_the_middle_outwards():
     fan = seen([camera(turn=(0.2 * k, 0.0)) for k in (2, 0, 1)])
     assert from_the_middle(fan[0], fan[1])[0] == 2
     assert from_the_middle(row[0][:2], row[1][:2]) == [0, 1]
+
+
+def test_of_many_photos_a_quarter_begins_surfaces():
+    """A wall that twelve photos see; in each it stands forward somewhere, by less than a gap asks for."""
+    depths, viewmats, Ks = seen([camera((0.02 * k, 0.0, 0.0)) for k in range(12)])
+    wrong = torch.zeros_like(depths, dtype=torch.bool)
+    for view in range(12):
+        wrong[view, 4:9, 2 * view : 2 * view + 5] = True
+    depths = torch.where(wrong, 0.85 * depths, depths)
+    first = spread(depths, viewmats, owners(12))
+    assert len(first) == 3
+    keep = owned(depths, viewmats, Ks)
+    kept = {view for view in range(12) if bool((keep & wrong)[view].any())}
+    assert kept and kept <= set(first)
+    assert covered(depths, viewmats, Ks, keep).all()
+
+
+def test_some_photos_are_near_all():
+    """Two clusters and one photo between: the best two for the sum of distances are in the clusters."""
+    places = [0.0, 0.1, 0.2, 1.0, 2.0, 2.1, 2.2]
+    depths, viewmats, _ = seen([camera((x, 0.0, 0.0)) for x in places])
+    assert spread(depths, viewmats, 1) == [3]
+    assert spread(depths, viewmats, 3) == [1, 3, 5]
+    assert spread(depths, viewmats, 7) == [*range(7)]
+    assert owners(8) == 8 and owners(9) == 3 and owners(32) == 8
 
 
 @pytest.mark.parametrize("views", [2, 5])
