@@ -16,24 +16,26 @@ _INK, _GRID, _TIME, _MEMORY = "#3a3a40", "#dcdce2", "#2f6fb0", "#d97b16"
 
 def walk_png(result: Mapping) -> bytes:
     """Left: processor seconds of a scene against its photos, beside the line through 0 and the fewest of more
-    than eight photos, as time would grow with their number alone. Right: the most memory, where it was
-    measured.
+    than eight photos, as time would grow with their number alone. Right, where it was measured: the most
+    memory.
 
     Args:
         result: of `run_walks`, means by number of photos.
     """
     rows = result["by_photos"]
     photos = [int(name) for name in rows]
-    figure = Figure((9.0, 3.6), dpi=110, layout="constrained", facecolor="white")
-    FigureCanvasAgg(figure)
-    left, right = figure.subplots(1, 2)
     seconds = [number(row.get("cpu_seconds")) for row in rows.values()]
     memory = [number(row.get("memory_mb")) / 1000 for row in rows.values()]
+    panels = 1 if all(map(math.isnan, memory)) else 2
+    figure = Figure((4.5 * panels, 3.6), dpi=110, layout="constrained", facecolor="white")
+    FigureCanvasAgg(figure)
+    left, *right = figure.subplots(1, panels, squeeze=False)[0]
     start = next((k for k, count in enumerate(photos) if count > 8), 0)
     pace = seconds[start] / photos[start]
     left.plot([0, photos[-1]], [0, pace * photos[-1]], "--", color=_GRID, linewidth=1.4)
     _drawn(left, photos, seconds, _TIME, "processor seconds")
-    _drawn(right, photos, memory, _MEMORY, "memory, GB")
+    for axes in right:
+        _drawn(axes, photos, memory, _MEMORY, "memory, GB")
     stream = io.BytesIO()
     figure.savefig(stream, format="png", metadata={"Software": None})
     return stream.getvalue()

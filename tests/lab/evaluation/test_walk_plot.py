@@ -23,3 +23,4 @@ def test_time_and_memory_are_drawn_where_they_are_known():
     assert orange[:, width // 2 :].any() and not orange[:, : width // 2].any()
     unknown = drawn({name: {**row, "memory_mb": None} for name, row in rows.items()})
     assert not (np.abs(unknown - [0xD9, 0x7B, 0x16]).sum(2) < 30).any()
+    assert unknown.shape[1] == width // 2, "no empty axes"
