@@ -33,7 +33,7 @@ _ALL = 8  # photos, up to which all are compared with all
 _TRIED = 8  # cells of a row and of a column, of which one is tried; and the side of a block
 _SOME, _SHARE = 9, 4
 """Photos from which on not all begin surfaces, but one of so many. Between the photos of a room 32 as owners
-gave 26.63 dB, 16 of them 27.13, 8 of them 27.24."""
+gave 26.63 dB, 16 of them 27.13, 8 of them 27.24; in four rooms of 16 and 32 photos depth is 6 % nearer."""
 _FINER = 2.0  # area that a pixel of the earlier photo covers over that of a later one which takes it over
 
 
