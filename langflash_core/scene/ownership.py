@@ -4,10 +4,9 @@ twice.
 Photos come from the middle outwards: the first that sees a surface has it, and each later one takes it over
 where it sees it finer by `_FINER` than who has it. Of many photos some, spread over all, come first, and the
 others begin nothing: what they show where no owner shows the same is mostly their own error. They take over
-and fill gaps. So all pixels that show one surface find the same photo,
-however many photos there are, and it is one that the others lie around: what its depth errs by moves little
-in their pictures. What stands before a surface that another photo knows better is given up as well
-(`consistency.seen_through`).
+and fill gaps. So all pixels that show one surface find the same photo, however many photos there are, and it
+is one that the others lie around: what its depth errs by moves little in their pictures. What stands before a
+surface that another photo knows better is given up as well (`consistency.seen_through`).
 
 Of more than `_ALL` photos, who has what is decided at every eighth cell of a row and of a column first; a
 photo's cells are then compared with those photos alone that had one of them at some time. A surface that many
@@ -31,7 +30,7 @@ BEHIND, BEFORE = 0.12, 0.12
 _ABOUT = 0.2  # relative depth by which what covers a cell may lie behind it
 _ALL = 8  # photos, up to which all are compared with all
 _TRIED = 8  # cells of a row and of a column, of which one is tried; and the side of a block
-_SOME, _SHARE = 9, 4
+_MANY, _SHARE = 9, 4
 """Photos from which on not all begin surfaces, but one of so many. Between the photos of a room 32 as owners
 gave 26.63 dB, 16 of them 27.13, 8 of them 27.24; in four rooms of 16 and 32 photos depth is 6 % nearer."""
 _FINER = 2.0  # area that a pixel of the earlier photo covers over that of a later one which takes it over
@@ -54,9 +53,8 @@ def owned(
     known = torch.ones_like(depths, dtype=torch.bool) if known is None else known
     if len(depths) == 1:
         return known
-    begins = torch.zeros(len(depths), dtype=torch.bool)
-    begins[spread(depths, viewmats, owners(len(depths)))] = True
-    order = sorted(from_the_middle(depths, viewmats), key=lambda view: not begins[view])
+    first = spread(depths, viewmats, owners(len(depths)))
+    order = sorted(from_the_middle(depths, viewmats), key=lambda view: view not in first)
     keep = torch.zeros_like(known)
     logs, focals = depths.log().flatten(1), Ks[:, 0, 0] if fineness is None else Ks[:, 0, 0] * fineness
     for view in range(len(depths)):
@@ -66,10 +64,10 @@ def owned(
         if len(depths) > _ALL:
             tried = _tried(depths.shape[1:])
             some = points[:, tried], normals[:, tried]
-            others = _holders(view, *some, viewmats, Ks, focals, logs, known, order, begins)
+            others = _holders(view, *some, viewmats, Ks, focals, logs, known, order)
         for other in others:
             area = _covered_area(points, normals, viewmats[other], focals[other])
-            takes = _takes(area, finest, bool(begins[other]))
+            takes = _takes(area, finest, other in first)
             if other != view:
                 takes &= _same(points, viewmats[other], Ks[other], logs[other], known[other])
             finest = torch.where(takes, area, finest)
@@ -81,7 +79,7 @@ def owned(
 def owners(count: int) -> int:
     """Of so many photos, those that own what nobody before them shows: each more has errors of its own, which
     hang beside the surfaces of the others."""
-    return count if count < _SOME else -(-count // _SHARE)
+    return count if count < _MANY else -(-count // _SHARE)
 
 
 def spread(depths: Float[Tensor, "V H W"], viewmats: Float[Tensor, "V 4 4"], count: int) -> list[int]:
@@ -94,7 +92,7 @@ def spread(depths: Float[Tensor, "V H W"], viewmats: Float[Tensor, "V 4 4"], cou
     """
     if count >= len(depths):
         return [*range(len(depths))]
-    between, chosen = _between(depths, viewmats), []
+    between, chosen = _between(depths, viewmats).sum(-1), []
     nearest = torch.full_like(between[0], torch.inf)
     for _ in range(count):
         left = torch.minimum(nearest, between).sum(1)
@@ -113,14 +111,14 @@ def from_the_middle(depths: Float[Tensor, "V H W"], viewmats: Float[Tensor, "V 4
     """
     if len(depths) <= 2:
         return [*range(len(depths))]
-    return _between(depths, viewmats).sum(1).argsort(stable=True).tolist()
+    return _between(depths, viewmats).sum((1, 2)).argsort(stable=True).tolist()
 
 
 def _between(depths: Tensor, viewmats: Tensor) -> Tensor:
-    """(V, V) how far photos are from each other: places over the median depth, and unit vectors of view."""
+    """(V, V, 2) how far photos are from each other: places over the median depth; unit vectors of view."""
     poses = invert_rigid(viewmats.double())
     seen_at = torch.cat((poses[:, :3, 3] / depths.median(), poses[:, :3, 2]), 1)
-    return (seen_at[:, None] - seen_at).unflatten(2, (2, 3)).norm(dim=-1).sum(-1)
+    return (seen_at[:, None] - seen_at).unflatten(2, (2, 3)).norm(dim=-1)
 
 
 def filled(
@@ -241,9 +239,9 @@ def _holders(
     logs: Tensor,
     known: Tensor,
     order: list[int],
-    begins: Bool[Tensor, " V"],
 ) -> list[int]:
-    """The photos, in their order, that have one of some points (3, n) of a view at some time, and itself."""
+    """The photos, in their order (owners first), that have one of some points (3, n) of a view at some time,
+    and itself."""
     height, width = known.shape[1:]
     centres = torch.stack([invert_rigid(own)[:3, 3] for own in viewmats])
     towards = points - centres[..., None]  # (V, 3, n)
@@ -258,9 +256,9 @@ def _holders(
     gap = ahead.log() - logs.gather(1, place)
     same = inside & known.flatten(1).gather(1, place) & (gap < BEHIND) & (gap > -BEFORE)
     same[view] = True
-    finest, held = torch.full_like(points[0], torch.inf), []
+    finest, held, first = torch.full_like(points[0], torch.inf), [], order[: owners(len(order))]
     for other in order:
-        takes = same[other] & _takes(areas[other], finest, bool(begins[other]))
+        takes = same[other] & _takes(areas[other], finest, other in first)
         if other == view or bool(takes.any()):
             held.append(other)
             finest = torch.where(takes, areas[other], finest)

@@ -189,7 +189,7 @@ def test_of_many_photos_a_quarter_begins_surfaces():
 
 
 def test_some_photos_are_near_all():
-    """Two clusters and one photo between: the best two for the sum of distances are in the clusters."""
+    """Two clusters and one photo between: first that one, then the middle of each cluster."""
     places = [0.0, 0.1, 0.2, 1.0, 2.0, 2.1, 2.2]
     depths, viewmats, _ = seen([camera((x, 0.0, 0.0)) for x in places])
     assert spread(depths, viewmats, 1) == [3]

@@ -9,7 +9,6 @@ import time
 from pathlib import Path
 
 import pytest
-from PIL import Image
 
 from app.window.scene import commands as show
 from app.window.scene import work
@@ -23,7 +22,7 @@ HEARD_SECONDS = 0.1  # it never waits for the job, only for its turn on a busy m
 STOPPED_SECONDS = 1.0  # from the cancel until the worker is free for the next job
 KEPT_MB = 40  # that may stay: what allocators hold back, not the some hundred MB of a reconstruction
 TRIES = 3  # what other programs take from this machine comes and goes; the best of these counts
-SHARE = 0.5  # of the photos' pixels in a row: stages are as many, and half as long
+PHOTOS = tuple(asset_path(f"photos/living_room_{side}.png") for side in ("left", "right"))
 NETWORKS = Networks()  # as a session holds one
 
 
@@ -32,21 +31,11 @@ def resident_mb() -> float:
     return next(int(line.split()[1]) for line in lines if line.startswith("VmRSS:")) / 1024
 
 
-@pytest.fixture(scope="module")
-def photos(tmp_path_factory) -> tuple[Path, ...]:
-    folder, made = tmp_path_factory.mktemp("photos"), []
-    for side in ("left", "right"):
-        with Image.open(asset_path(f"photos/living_room_{side}.png")) as photo:
-            made.append(folder / f"{side}.png")
-            photo.reduce(round(1 / SHARE)).save(made[-1])
-    return tuple(made)
-
-
-def stages_of(worker: Worker, photos: tuple[Path, ...]) -> dict[str, float]:
+def stages_of(worker: Worker) -> dict[str, float]:
     """When each stage of a whole reconstruction began, seconds from the first one; but for how far matching
     is, which is told by the clock and not in every run."""
     began: dict[str, float] = {}
-    worker.submit(work.ReconstructPhotos(photos, networks=NETWORKS))
+    worker.submit(work.ReconstructPhotos(PHOTOS, networks=NETWORKS))
     end = time.monotonic() + PATIENCE
     while "done" not in began:
         assert time.monotonic() < end, began
@@ -59,21 +48,19 @@ def stages_of(worker: Worker, photos: tuple[Path, ...]) -> dict[str, float]:
 
 
 @pytest.fixture(scope="module")
-def rehearsed(photos):
+def rehearsed():
     """A worker that has made the scene once, so that weights are read, and its stages: name -> the
     middle of each, seconds after its beginning."""
     worker = Worker()
-    stages_of(worker, photos)  # the first one reads the weights
-    began = stages_of(worker, photos)
+    stages_of(worker)  # the first one reads the weights
+    began = stages_of(worker)
     times = list(began.values())
     lasted = (after - before for before, after in itertools.pairwise(times))
     yield worker, {stage: seconds / 2 for stage, seconds in zip(began, lasted, strict=False)}
     worker.stop()
 
 
-def cancelled_in(
-    worker: Worker, photos: tuple[Path, ...], stage: str, wait: float
-) -> tuple[float, float, float]:
+def cancelled_in(worker: Worker, stage: str, wait: float) -> tuple[float, float, float]:
     """Cancel `wait` seconds into a stage.
 
     Returns:
@@ -83,7 +70,7 @@ def cancelled_in(
     gc.collect()
     give_back()
     before = resident_mb()
-    worker.submit(work.ReconstructPhotos(photos, networks=NETWORKS))
+    worker.submit(work.ReconstructPhotos(PHOTOS, networks=NETWORKS))
     end = time.monotonic() + PATIENCE
     while not any(r.stage == stage for r in worker.poll() if isinstance(r, show.Progressed)):
         assert time.monotonic() < end, stage
@@ -101,13 +88,13 @@ def cancelled_in(
 
 
 @pytest.mark.skipif(not os.path.exists("/proc/self/status"), reason="asks Linux for the memory held")
-def test_cancel_in_any_stage_frees_the_worker_and_its_memory(rehearsed, photos) -> None:
+def test_cancel_in_any_stage_frees_the_worker_and_its_memory(rehearsed) -> None:
     worker, stages = rehearsed
     assert len(stages) >= 8  # photos, weights, the network's own, assemble, prune
     for stage, middle in stages.items():
         tries = []
         for _ in range(TRIES):
-            tries.append(cancelled_in(worker, photos, stage, middle))
+            tries.append(cancelled_in(worker, stage, middle))
             heard, free, kept = (min(values) for values in zip(*tries, strict=True))
             if heard < HEARD_SECONDS and free < STOPPED_SECONDS and kept < KEPT_MB:
                 break

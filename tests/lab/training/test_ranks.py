@@ -41,7 +41,7 @@ def folder(rooms) -> Path:
 
 @pytest.mark.slow
 def test_two_processes_learn_what_one_learns_of_the_same_batches(folder, tmp_path):
-    stages, steps = ["grouping", "refine!"], 2
+    stages, steps = ["language", "grouping", "refine!"], 2
     script = Path(__file__).with_name("shared_steps.py")
     launcher = [sys.executable, "-m", "torch.distributed.run", "--standalone", "--nproc-per-node=2"]
     words = [str(script), str(folder), str(tmp_path / "two"), "2", str(steps), *stages]
