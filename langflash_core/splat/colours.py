@@ -10,12 +10,13 @@ lessen sum |photo - F|^2 (Landweber's iteration, the normal matrix lumped onto i
 Andersen and Kak 1984 with one subset), each begun a little ahead of the last (Beck and Teboulle 2009,
 FISTA). Colours stay within [0, 1] or, with `ringing`, near what the photos show around a Gaussian.
 
+With slopes a colour also changes with the direction from which it is seen, and a block of the normal matrix
+takes the place of its lumped diagonal (`slopes`).
+
 Of a view only the Gaussians that it shows are held. Many photos say the same again and again: each of them
 speaks in one block of its pixels in some, in another one than its neighbours, and in a low voice where much
-of what it shows is its own, since nobody else may see that. More than `TOGETHER` photos' worth of pixels are
-solved for in groups of neighbours in their order, each from where those before it came to; a colour is the
-mean of what its groups found, weighed by how much of it each saw. So memory stays that of one group, and
-time grows with the photos.
+of what it shows is its own, since nobody else may see that. So memory stays that of `_EVERY` photos, however
+many there are.
 
 What brings the pictures nearer to the photos by going is left out (`hindering`), and the rounds go on without
 it.
@@ -26,7 +27,6 @@ Sizes: V views, N Gaussians, n of them in one view, h w pixels of a photo.
 import math
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from itertools import pairwise
 
 import cv2
 import numpy as np
@@ -35,19 +35,19 @@ import torch
 from jaxtyping import Bool, Float, Int
 from torch import Tensor
 
+from langflash_core.geometry.cameras import invert_rigid
 from langflash_core.memory import give_back
 from langflash_core.splat.frustum import Packs, reaches
 from langflash_core.splat.hindering import Pairs, Tally
 from langflash_core.splat.mixing import FAINT, mixed
 from langflash_core.splat.projection import Footprints, project
+from langflash_core.splat.slopes import Steps, across, bases, directions, middles
 from langflash_core.types import Camera, Gaussians
 
 ROUNDS = 8
-TOGETHER = 10
-"""Photos that are solved for at once: a group of them holds half a gigabyte at 672 x 672 pixels."""
-_MANY, _EVERY, _MOST_EVERY = 8, 8, 8
-"""Photos up to which all speak everywhere; of more, those of which one speaks in a block, and in one block of
-how many each speaks at least."""
+_MANY, _EVERY = 8, 8
+"""Photos up to which all speak everywhere; of more, those of which one speaks in a block. Eight hold half a
+gigabyte at 672 x 672 pixels."""
 _JUDGED = {"small": 0.004}
 """Contribution below which pairs are left out where what hinders is sought: with .01 half is found."""
 _BLOCK, _OWN = (
@@ -62,16 +62,17 @@ _WINDOWS, _FINE = (5, 13), 1.5
 _STEP = 0.5 / 255  # to which the photo is rounded there
 _OF_VIEWS = 0.75  # of the time, for which contributions are listed
 _SEEN = 0.05  # contributions of a Gaussian over all pixels, below which its colour stays
-_PROBE = 8  # of rows of pixels, by one of which a group is judged after others came
 
 
 @dataclass(frozen=True)
 class Solved:
-    """colours: (N, 3) in [0, 1]. psnr: dB of each view before the rounds and after them. hinders: (N,) bool,
-    without which the pictures are nearer to the photos; colours and `psnr` are those without them where all
-    photos are one group."""
+    """colours: (N, 3) in [0, 1], seen from the middle of the photos. slopes: (N, 3, 3), what is added to them
+    seen along a unit direction d, from the camera, is d @ slopes; None: nothing. psnr: dB of each view before
+    the rounds and after them. hinders: (N,) bool, without which the pictures are nearer to the photos;
+    colours and the later `psnr` are those without them."""
 
     colours: Float[Tensor, "N 3"]
+    slopes: Float[Tensor, "N 3 3"] | None
     psnr: tuple[tuple[float, float], ...]
     hinders: Bool[Tensor, " N"]
 
@@ -86,6 +87,7 @@ def solved_colours(
     owners: Int[Tensor, " N"] | None = None,
     rounds: int = ROUNDS,
     ringing: float | None = None,
+    slopes: bool = False,
     leave_out: bool = False,
     progress: Callable[[float], None] = lambda done: None,
 ) -> Solved:
@@ -99,8 +101,8 @@ def solved_colours(
         owners: (N,) int64, the view that made each Gaussian; None: every photo speaks in all its pixels.
         ringing: how far colours may leave what the photos show around a Gaussian, in parts of how much that
             differs; None: within [0, 1], as far as they like.
-        leave_out: Gaussians that hinder are found: of one group after half of the rounds, the others
-            without them; of several after all.
+        slopes: colours change with the direction.
+        leave_out: Gaussians that hinder are found after half of the rounds, and left out of the others.
         progress: called with the share that is done, before every view and every round; what it raises ends
             the work there.
 
@@ -108,86 +110,56 @@ def solved_colours(
         ValueError: there are not as many cameras, or trusts, as photos.
 
     Returns:
-        Colours, and how near every photo they come where it speaks: of several groups of photos "after" is
-        over an eighth of that.
+        Colours, and how near every photo they come where it speaks.
     """
     if len(cameras) != len(photos) or (trusts is not None and len(trusts) != len(photos)):
         raise ValueError(f"cameras, trusts: expected one for each of {len(photos)} photos, received others")
     gaussians = gaussians.map(lambda values: values.float())
     first = start.detach().cpu().numpy().astype(np.float32)
-    packs, answer = Packs.of(gaussians), _Answer.of(first)
-    before, probes = [], []
-    share = 1 if owners is None or len(photos) <= _MANY else min(-(-len(photos) // _EVERY), _MOST_EVERY)
-    bounds, cuts = _groups(len(photos), share), _JUDGED if leave_out else {}
-    tally, alone = Tally.of(len(first)), len(bounds) == 2
-    for begin, end in pairwise(bounds):
-        told = _within(progress, begin / len(photos), (end - begin) / len(photos))
-        group = _Group(len(first), told, rounds)
-        for view in range(begin, end):
-            told(_OF_VIEWS * (view - begin) / (end - begin))
-            rows = packs.before(cameras[view])
-            own = None if owners is None or share == 1 else (owners[rows.to(owners.device)] == view)
-            spoken = None if own is None else _Spoken(own.cpu().numpy(), view, share)
-            trust = None if trusts is None else trusts[view]
-            seen = _View.of(gaussians, rows, cameras[view], photos[view], trust, cuts, spoken)
-            group.views.append(seen)
-            if len(photos) > _MANY:
-                give_back()  # each view leaves holes of other sizes
-        before += [view.error(first) for view in group.views]
-        first_rounds = rounds - rounds // 2 if leave_out and alone else rounds
-        found = group.solved(answer.colours, first_rounds, ringing)
-        if leave_out:
-            group.tell(tally, found)
-        if first_rounds < rounds:
-            group.leave(tally.hindering)
-            found = group.solved(found, rounds - first_rounds, ringing)
-        answer.take(found, group.total)
-        probes += group.views if alone else [view.every(_PROBE) for view in group.views]
-    after = [view.error(answer.colours) for view in probes]
-    nearness = tuple(zip(before, after, strict=True))
-    return Solved(torch.from_numpy(answer.colours), nearness, torch.from_numpy(tally.hindering))
+    packs, group = Packs.of(gaussians), _Group(len(first), progress, rounds)
+    share = 1 if owners is None or len(photos) <= _MANY else -(-len(photos) // _EVERY)
+    cuts = _JUDGED if leave_out else {}
+    for view in range(len(photos)):
+        progress(_OF_VIEWS * view / len(photos))
+        rows = packs.before(cameras[view])
+        own = None if owners is None or share == 1 else (owners[rows.to(owners.device)] == view)
+        spoken = None if own is None else _Spoken(own.cpu().numpy(), view, share)
+        trust = None if trusts is None else trusts[view]
+        group.views.append(_View.of(gaussians, rows, cameras[view], photos[view], trust, cuts, spoken))
+        if len(photos) > _MANY:
+            give_back()  # each view leaves holes of other sizes
+    if slopes:
+        group.look(gaussians.means.cpu().numpy(), [_centre(own) for own in cameras])
+    before = [view.error(first[view.ids]) for view in group.views]
+    tally, later = Tally.of(len(first)), rounds // 2 if leave_out else 0
+    looks = group.solved(_looks(first, slopes), rounds - later, ringing)
+    if leave_out:
+        group.tell(tally, looks)
+        group.leave(tally.hindering)
+        looks = group.solved(looks, later, ringing)
+    nearness = tuple(
+        (was, view.error(view.colours(looks))) for was, view in zip(before, group.views, strict=True)
+    )
+    added = torch.from_numpy(looks[:, 1:]) if slopes else None
+    return Solved(torch.from_numpy(looks[:, 0]), added, nearness, torch.from_numpy(tally.hindering))
 
 
-def _groups(count: int, share: int = 1) -> list[int]:
-    """Where groups of photos begin and the last ends: equally many in each, at most `TOGETHER` where each
-    speaks in all its pixels, as many more as it speaks in fewer."""
-    number = -(-count // (TOGETHER * share))
-    return [count * k // number for k in range(number + 1)] if count else []
+def _looks(colours: np.ndarray, slopes: bool) -> np.ndarray:
+    """(N, B, 3) of colours (N, 3) that are the same from everywhere."""
+    return np.pad(colours[:, None], ((0, 0), (0, 3 if slopes else 0), (0, 0)))
 
 
-def _within(progress: Callable[[float], None], start: float, share: float) -> Callable[[float], None]:
-    return lambda done: progress(start + share * done)
-
-
-@dataclass
-class _Answer:
-    """colours (N, 3) of all groups so far, and how much of each Gaussian they saw (N,)."""
-
-    colours: np.ndarray
-    seen: np.ndarray
-
-    @staticmethod
-    def of(start: np.ndarray) -> "_Answer":
-        return _Answer(start, np.zeros(len(start), np.float32))
-
-    def take(self, colours: np.ndarray, total: np.ndarray) -> None:
-        """What another group found, and how much it saw."""
-        if not self.seen.any():
-            self.colours, self.seen = colours, total.copy()
-            return
-        moved = np.flatnonzero(total > _SEEN)
-        known, more = self.seen[moved], total[moved]
-        known = np.where(known > _SEEN, known, 0)
-        share = (more / (known + more))[:, None]
-        self.colours[moved] += share * (colours[moved] - self.colours[moved])
-        self.seen[moved] = known + more
+def _centre(camera: Camera) -> np.ndarray:
+    """(3,) where a camera stands."""
+    return invert_rigid(camera.viewmat.double())[:3, 3].float().cpu().numpy()
 
 
 class _Group:
-    """Views that are solved for together, in so many rounds in all."""
+    """All views, in so many rounds."""
 
     def __init__(self, count: int, progress: Callable[[float], None], rounds: int):
         self.views: list[_View] = []
+        self._middle: np.ndarray | None = None
         self._count = count
         self._progress = progress
         self._done, self._rounds = 0, rounds
@@ -200,29 +172,39 @@ class _Group:
             total[view.ids] += view.sums
         return total
 
+    def look(self, means: np.ndarray, centres: Sequence[np.ndarray]) -> None:
+        """Colours change with directions from now on: from each view's centre (3,) to the means (N, 3)."""
+        ways = [directions(means[view.ids], own) for view, own in zip(self.views, centres, strict=True)]
+        seen = zip(self.views, ways, strict=True)
+        self._middle = middles(self._count, ((view.ids, view.sums, way) for view, way in seen))
+        for number, (view, way) in enumerate(zip(self.views, ways, strict=True)):
+            self.views[number] = replace(view, bases=bases(way, self._middle[view.ids]))
+
     def solved(self, start: np.ndarray, rounds: int, ringing: float | None) -> np.ndarray:
-        """Colours (N, 3) after some rounds."""
+        """Looks (N, B, 3) after some rounds."""
         total = self.total
-        scale = np.where(total > _SEEN, 1 / np.maximum(total, _SEEN), 0.0)[:, None].astype(np.float32)
-        low, high = self._bounds(start, ringing)
-        colours = ahead = start
+        sloped = ((view.ids, view.sums, view.bases) for view in self.views if view.bases is not None)
+        steps = Steps.of(total, total > _SEEN, sloped)
+        low, high = self._bounds(start[:, 0], ringing)
+        looks = ahead = start if self._middle is None else across(start, self._middle)
         pace = 1.0
         for _ in range(rounds):
             self._progress(_OF_VIEWS + (1 - _OF_VIEWS) * self._done / self._rounds)
             self._done += 1
-            step = np.zeros_like(start)
+            said = np.zeros_like(start)
             for view in self.views:
-                step[view.ids] += view.carried_back(ahead)
-            found = np.clip(ahead + scale * step, low, high)
+                said[view.ids] += view.carried_back(ahead)
+            found = steps.taken(ahead, said)
+            found[:, 0] = np.clip(found[:, 0], low, high)
             following = (1 + math.sqrt(1 + 4 * pace * pace)) / 2
-            ahead = found + ((pace - 1) / following) * (found - colours)
-            colours, pace = found, following
-        return colours
+            ahead = found + ((pace - 1) / following) * (found - looks)
+            looks, pace = found, following
+        return looks
 
-    def tell(self, tally: Tally, colours: np.ndarray) -> None:
-        """What all views say of each Gaussian in these colours (N, 3)."""
+    def tell(self, tally: Tally, looks: np.ndarray) -> None:
+        """What all views say of each Gaussian that looks so (N, B, 3)."""
         for view in self.views:
-            view.tell(tally, colours)
+            view.tell(tally, looks)
 
     def leave(self, gone: np.ndarray) -> None:
         """Some Gaussians, (N,) bool, are not drawn any more."""
@@ -298,7 +280,7 @@ class _View:
     1. sums: (n,) of contributions, times the trust. shown: (h w, 1), 1 where something is drawn and the photo
     is a number, else 0. around: rows of some Gaussians, and least and most of the photo around each, uint8.
     size: (h, w), or 1 and how many pixels where a photo speaks in some, which are those of the rows here.
-    counts: (h w, 1), what each pixel's word counts, None: 1."""
+    counts: (h w, 1), what each pixel's word counts, None: 1. bases: (n, 4), of `slopes`, None: 1."""
 
     ids: np.ndarray
     contributions: scipy.sparse.csr_matrix
@@ -310,6 +292,7 @@ class _View:
     around: tuple[np.ndarray, np.ndarray, np.ndarray]
     size: tuple[int, int]
     counts: np.ndarray | None = None
+    bases: np.ndarray | None = None
 
     @staticmethod
     def of(
@@ -366,22 +349,15 @@ class _View:
             counts=None if self.counts is None else self.counts[kept],
         )
 
-    def every(self, step: int) -> "_View":
-        """What one row of pixels in `step` says; of a photo that speaks in some pixels one of so many."""
-        height, width = self.size
-        kept = np.arange(height * width).reshape(height, width)
-        kept = kept[:, step // 2 :: step] if height == 1 else kept[step // 2 :: step]
-        part = self.at(kept.ravel())
-        matrix, some = _narrowed(part.contributions, len(self.ids))
-        nothing = (np.zeros(0, np.int64), np.zeros((0, 3), np.uint8), np.zeros((0, 3), np.uint8))
-        return replace(
-            part, ids=self.ids[some], contributions=matrix, trust=None, sums=self.sums[some], around=nothing
-        )
+    def colours(self, looks: np.ndarray) -> np.ndarray:
+        """(n, 3) of its Gaussians, of looks (N, B, 3)."""
+        own = looks[self.ids]
+        return own[:, 0] if self.bases is None else np.einsum("nb,nbc->nc", self.bases, own)
 
-    def tell(self, tally: Tally, colours: np.ndarray) -> None:
+    def tell(self, tally: Tally, looks: np.ndarray) -> None:
         """What is nearer to the photo without each Gaussian."""
         pairs = Pairs.of(self.contributions, self.light)
-        tally.take(pairs, self.ids, colours[self.ids], self.photo, self.shown[:, 0] > 0)
+        tally.take(pairs, self.ids, self.colours(looks), self.photo, self.shown[:, 0] > 0)
 
     def without(self, gone: np.ndarray) -> "_View":
         """The same without some of its Gaussians, (n,) bool."""
@@ -396,17 +372,18 @@ class _View:
         return replace(self, contributions=matrix, light=light, shown=shown, sums=sums)
 
     def wrong(self, colours: np.ndarray) -> np.ndarray:
-        """(h w, 3) the photo less the picture, 0 where nothing is drawn."""
-        return (self.photo - self.contributions @ colours[self.ids]) * self.shown
+        """(h w, 3) the photo less the picture in colours (n, 3), 0 where nothing is drawn."""
+        return (self.photo - self.contributions @ colours) * self.shown
 
-    def carried_back(self, colours: np.ndarray) -> np.ndarray:
-        """(n, 3) of what is wrong."""
-        wrong = self.wrong(colours)
+    def carried_back(self, looks: np.ndarray) -> np.ndarray:
+        """(n, B, 3) of what is wrong."""
+        wrong = self.wrong(self.colours(looks))
         back = self.contributions.T @ (wrong if self.counts is None else wrong * self.counts)
-        return back if self.trust is None else back * self.trust
+        back = back if self.trust is None else back * self.trust
+        return back[:, None] if self.bases is None else self.bases[:, :, None] * back[:, None]
 
     def error(self, colours: np.ndarray) -> float:
-        """PSNR in dB of what is drawn."""
+        """PSNR in dB of what is drawn in colours (n, 3)."""
         off = self.wrong(colours)
         mean = float(np.square(off).sum(dtype=np.float64) / max(1.0, 3 * float(self.shown.sum())))
         return -10 * float(np.log10(max(mean, 1e-10)))

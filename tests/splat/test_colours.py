@@ -10,7 +10,6 @@ mean square error is at most that of the true colours plus 1 / (k + 1)^2.
 """
 
 import dataclasses
-import itertools
 import math
 from collections.abc import Sequence
 
@@ -288,37 +287,6 @@ def row_of_views(count: int) -> tuple[list[Camera], Gaussians, Tensor, list[Tens
     gaussians, colours = scene()
     cameras = [camera(pose=turned(0.02 * k, (-0.05 * k, 0, 0))) for k in range(count)]
     return cameras, gaussians, colours, [picture(gaussians, colours, seen)[0] for seen in cameras]
-
-
-@pytest.mark.parametrize(("count", "groups"), [(5, [2, 3]), (6, [3, 3]), (7, [2, 2, 3])])
-def test_many_photos_are_solved_for_in_groups(monkeypatch, count, groups):
-    """Nearly as well as together; every group holds its own views alone, and progress goes on."""
-    cameras, gaussians, colours, photos = row_of_views(count)
-    together = solved_colours(gaussians, grey(colours), cameras, photos)
-    monkeypatch.setattr(module, "TOGETHER", 3)
-    told: list[float] = []
-    apart = solved_colours(gaussians, grey(colours), cameras, photos, progress=told.append)
-    assert len(told) == count + len(groups) * ROUNDS and told == sorted(told) and told[-1] < 1
-    assert [b - a for a, b in itertools.pairwise(module._groups(count))] == groups
-    assert [before for before, _ in apart.psnr] == [before for before, _ in together.psnr]
-    after = [np.mean([psnr for _, psnr in solved.psnr]) for solved in (together, apart)]
-    assert after[1] > after[0] - 0.5  # each from where those before it came to: most gain
-
-
-def test_groups_that_share_nothing_are_as_if_alone(monkeypatch):
-    """Two scenes back to back: each group's colours are those that its photos alone would give."""
-    ahead, colours = scene()
-    about = turned(math.pi, (0, 0, 0))
-    behind = dataclasses.replace(ahead, means=ahead.means * torch.tensor([-1.0, 1.0, -1.0]))
-    both = Gaussians(
-        *(torch.cat(pair) for pair in zip(*(vars(g).values() for g in (ahead, behind)), strict=True))
-    )
-    cameras, start = [camera(), camera(pose=about)], torch.cat((grey(colours), grey(colours)))
-    photos = [torch.rand(3, 40, 48, generator=torch.Generator().manual_seed(k)) for k in range(2)]
-    together = solved_colours(both, start, cameras, photos)
-    monkeypatch.setattr(module, "TOGETHER", 1)
-    apart = solved_colours(both, start, cameras, photos)
-    assert (apart.colours - together.colours).abs().max() < CLOSE
 
 
 def test_no_photos():
