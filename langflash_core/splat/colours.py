@@ -279,8 +279,8 @@ class _View:
     drawn, each pixel's front to back. light: (h w,) that stays there. photo: (h w, 3). trust: (n, 1), None:
     1. sums: (n,) of contributions, times the trust. shown: (h w, 1), 1 where something is drawn and the photo
     is a number, else 0. around: rows of some Gaussians, and least and most of the photo around each, uint8.
-    size: (h, w), or 1 and how many pixels where a photo speaks in some, which are those of the rows here.
-    counts: (h w, 1), what each pixel's word counts, None: 1. bases: (n, 4), of `slopes`, None: 1."""
+    counts: (h w, 1), what each pixel's word counts, None: 1. bases: (n, 4), of `slopes`, None: 1. Of a photo
+    that speaks in some pixels alone, h w is how many these are."""
 
     ids: np.ndarray
     contributions: scipy.sparse.csr_matrix
@@ -290,7 +290,6 @@ class _View:
     sums: np.ndarray
     shown: np.ndarray
     around: tuple[np.ndarray, np.ndarray, np.ndarray]
-    size: tuple[int, int]
     counts: np.ndarray | None = None
     bases: np.ndarray | None = None
 
@@ -319,7 +318,7 @@ class _View:
         shown = (light >= _LEAST) & np.isfinite(flat).all(1)
         flat[~shown] = 0
         matrix.data *= np.repeat(shown / np.maximum(light, _LEAST), np.diff(matrix.indptr)).astype(np.float32)
-        ids, size = seen.cpu().numpy()[some], (camera.height, camera.width)
+        ids = seen.cpu().numpy()[some]
         counts = np.ones(len(flat), np.float32) if loudness is None else loudness.ravel()
         sums = matrix.T @ counts
         told = None if trust is None else trust.cpu().numpy().astype(np.float32)[ids]
@@ -327,10 +326,10 @@ class _View:
             sums = sums * told
         placed = np.full(len(seen), -1)
         placed[some] = np.arange(len(some))
-        around = _around(footprints, placed, sums, flat.reshape(*size, 3))
+        around = _around(footprints, placed, sums, flat.reshape(camera.height, camera.width, 3))
         view = _View(
             ids, matrix, stays.astype(np.float32), flat, None if told is None else told[:, None], sums,
-            shown[:, None].astype(np.float32), (ids[around[0]], *around[1:]), size,
+            shown[:, None].astype(np.float32), (ids[around[0]], *around[1:]),
         )  # fmt: skip
         if loudness is None:
             return view
@@ -345,7 +344,6 @@ class _View:
             light=self.light[kept],
             photo=self.photo[kept],
             shown=self.shown[kept],
-            size=(1, len(kept)),
             counts=None if self.counts is None else self.counts[kept],
         )
 
