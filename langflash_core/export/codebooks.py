@@ -56,11 +56,11 @@ def palette(vectors: np.ndarray, size: int) -> tuple[np.ndarray, np.ndarray]:
 
 def _nearest(points: torch.Tensor, centres: torch.Tensor) -> torch.Tensor:
     """The nearest centre (n,) of points (n, d): |c|^2 - 2 p c is smallest where |p - c|^2 is. Of few numbers
-    each (harmonics of degree 1) a tree finds it, in a twentieth of the time.
+    each (harmonics of degree 1) a tree finds it: a palette of 8,192 in 4 seconds instead of 11.
 
     Distances share one buffer: made anew for each part, they left gigabytes of holes between small results.
     """
-    if points.shape[1] <= _FEW:
+    if points.shape[1] <= _FEW and bool(points.isfinite().all()):  # a tree refuses what is no number
         return torch.from_numpy(KDTree(centres.numpy()).query(points.numpy())[1])
     norms = (centres**2).sum(1)
     step = max(1, _PAIRS_AT_ONCE // len(centres))

@@ -242,9 +242,11 @@ class _Spoken:
         inside = (x >= 0) & (y >= 0) & (x < wide) & (y < high)
         places, own = (y * wide + x)[inside], self.own[inside]
         counts, mine = (np.bincount(places, of, minlength=high * wide) for of in (None, own))
-        turns = np.arange(high)[:, None] * _TURN + np.arange(wide) + self.view
+        turn = min(_TURN, wide)
+        turns = np.arange(high)[:, None] * turn + np.arange(wide) + self.view
         known = ((mine >= _OWN * counts) & (mine > 0)).reshape(high, wide)
-        return np.where(turns % self.share == 0, 1, np.where(known, _LOW, 0)).astype(np.float32)
+        share = min(self.share, (high - 1) * turn + wide)  # nobody is silent, however many there are
+        return np.where(turns % share == 0, 1, np.where(known, _LOW, 0)).astype(np.float32)
 
     def heard(self, gaussians: Gaussians, camera: Camera) -> tuple[Tensor, np.ndarray]:
         """(n,) bool, which of the Gaussians that the photo may see touch a block where it speaks; and (h, w)

@@ -316,6 +316,16 @@ def test_of_many_photos_each_speaks_in_turn_and_colours_come_back(monkeypatch):
     assert -10 * math.log10(off[0] / off[1]) > -3  # pictures that agree are known from a part
 
 
+def test_of_more_photos_than_blocks_none_is_silent(monkeypatch):
+    """Twelve photos of four blocks each, of which one would speak in the twelfth of its blocks."""
+    cameras, gaussians, colours, photos = row_of_views(12)
+    for name, value in (("_MANY", 3), ("_EVERY", 1), ("_BLOCK", 24)):
+        monkeypatch.setattr(module, name, value)
+    owners = torch.full((400,), -1)
+    solved = solved_colours(gaussians, grey(colours), cameras, photos, owners=owners)
+    assert all(before < 30 and before + 10 < after < 100 for before, after in solved.psnr)
+
+
 def test_few_photos_speak_everywhere_whoever_made_what():
     cameras, gaussians, colours, photos = row_of_views(4)
     owners = torch.arange(400) % 4
