@@ -96,7 +96,8 @@ class Tally:
     """What a run collects. numbers: per photo, by name; counts: confusion by (method, label set), the
     last column for pixels without an answer; presence: found against truth; scores, truths: of every
     phrase asked; ious: of the masks of present phrases at each of `MASK_THRESHOLDS`, one row each;
-    overlaps: per fine name the pixels of mask and truth together, of either, and photos."""
+    overlaps: per fine name the pixels of mask and truth together, of either, and photos; masks: by (method,
+    name) true masks, and how many of them are called so."""
 
     numbers: dict[str, list[float]] = field(default_factory=dict)
     counts: dict[tuple[str, str], Tensor] = field(default_factory=dict)
@@ -105,6 +106,7 @@ class Tally:
     truths: list[Tensor] = field(default_factory=list)
     ious: list[Tensor] = field(default_factory=list)
     overlaps: dict[str, tuple[int, int, int]] = field(default_factory=dict)
+    masks: dict[tuple[str, str], tuple[int, int]] = field(default_factory=dict)
 
     def note(self, **values: float) -> None:
         for name, value in values.items():
@@ -150,7 +152,8 @@ def run_photos(
         render: draws a scene with weight maps. size: as `reconstruct` has it.
 
     Returns:
-        Plain JSON ("measures", "labels", "class_ious", "paper_ious", "names") and what it was made from.
+        Plain JSON ("measures", "labels", "class_ious", "paper_ious", "names", "masks") and what it was
+        made from.
 
     Raises:
         InputError: the folder has no labels, or a map cannot be used. WeightsError: of the checkpoint.
@@ -325,6 +328,30 @@ def judge_names(judged: Judged, drawn: Drawn, tally: Tally) -> None:
         if words.fine:
             fine = maps[words.rows(words.fine)].argmax(0).masked_fill(unanswered, -1).flatten()
             tally.count(method, "fine", fine, words.fine_of[drawn.ids].flatten(), len(words.fine))
+    name_masks(judged, drawn, features, tally)
+
+
+def name_masks(judged: Judged, drawn: Drawn, features: Tensor, tally: Tally) -> None:
+    """What the true mask of every name in sight is called, of all names of the folder, by the mean of what
+    lies in it; features (C, h, w) of the photo. A name without `MIN_SHARE` of the picture is not judged."""
+    words = judged.words
+    rows = words.every_of[drawn.ids].flatten()
+    areas = torch.bincount(rows[rows >= 0], minlength=len(words.every))
+    shown = torch.nonzero(areas >= MIN_SHARE * len(rows)).flatten()
+    if not len(shown):
+        return
+    inside = (rows == shown[:, None]).float() / areas[shown, None]  # (M, H W), rows of sum 1
+    assert drawn.frame.weight_maps is not None
+    compiled = compile_query(drawn.scene, judged.space, words.every)
+    atoms = relevance_maps(inside @ drawn.frame.weight_maps.flatten(0, 1), compiled)
+    size = (drawn.ids.shape[0], drawn.ids.shape[1])
+    wide = F.interpolate(features[None], size=size, mode="bilinear", align_corners=False)[0]
+    alone = judged.vectors[words.rows(words.every)] @ (inside @ wide.flatten(1).T).T
+    for method, answers in zip(METHODS, (atoms, alone), strict=True):  # (P, M)
+        right = (answers.argmax(0) == shown) & (answers != 0).any(0)
+        for row, hit in zip(shown.tolist(), right.tolist(), strict=True):
+            masks, hits = tally.masks.get((method, words.every[row]), (0, 0))
+            tally.masks[method, words.every[row]] = (masks + 1, hits + hit)
 
 
 def judge_borders(judged: Judged, photo: LabelledPhoto, drawn: Drawn, tally: Tally) -> None:
@@ -419,6 +446,13 @@ def summary(tally: Tally, words: PhotoWords) -> dict:
     if (LARGE, "classes") in tally.counts:
         counts = tally.counts[LARGE, "classes"]
         measures["large_classes_miou"] = mean_iou(counts, range(len(words.classes)))
+    masks = _mask_report(tally, words)
+    if masks:
+        measures["masks"] = float(sum(row["masks"] for row in masks))
+        for method in METHODS:
+            hits = sum(row[method] for row in masks)
+            measures[f"masks_right_{method}"] = hits / measures["masks"]
+            measures[f"mask_names_right_{method}"] = nan_mean(row[method] / row["masks"] for row in masks)
     labels: dict[str, dict[str, float]] = {}
     for (method, kind), counts in tally.counts.items():
         if method not in METHODS:
@@ -432,7 +466,20 @@ def summary(tally: Tally, words: PhotoWords) -> dict:
         "class_ious": _ious(tally, "classes", words.classes),
         "paper_ious": _ious(tally, "paper", PAPER_LABELS),
         "names": _fine_report(tally, words),
+        "masks": masks,
     }
+
+
+def _mask_report(tally: Tally, words: PhotoWords) -> list[dict]:
+    """Names in sight with their true masks, and how many of these each method calls so."""
+    rows = []
+    for name in words.every:
+        masks, _ = tally.masks.get((METHODS[0], name), (0, 0))
+        if masks:
+            rows.append(
+                {"name": name, "masks": masks, **{method: tally.masks[method, name][1] for method in METHODS}}
+            )
+    return rows
 
 
 def _ious(tally: Tally, kind: str, names: Sequence[str]) -> dict[str, dict[str, float | None]]:

@@ -21,6 +21,14 @@ PHOTOS = (
     ("At the photo's size: named right within 8 pixels of a border", "right_near_borders", "", ""),
     ("At the photo's size: named right elsewhere", "right_elsewhere", "", ""),
     ("At the photo's size: mIoU of 37 classes", "large_classes_miou", "", ""),
+    (
+        "True masks called by their name, of all names of the folder",
+        "masks_right_atoms",
+        "2D features",
+        "masks_right_features",
+    ),
+    ("... mean over names", "mask_names_right_atoms", "2D features", "mask_names_right_features"),
+    ("... masks judged", "masks", "", ""),
     ("Share of the picture that the scene covers", "covered", "", ""),
     ("Reconstruction, seconds a photo", "seconds", "", ""),
 )

@@ -43,7 +43,8 @@ class PhotoWords:
     """Lists that are asked, and tables (largest id + 1,) from ids to their rows; -1 = not judged.
 
     classes: the 37, in `classes_of`. papers: rows of `PAPER_LABELS`; published: the same, by class alone.
-    fine, fine_of: names in at least `FINE_PHOTOS` photos. asked, asked_of: names that may be asked.
+    fine, fine_of: names in at least `FINE_PHOTOS` photos. asked, asked_of: names that may be asked. every,
+    every_of: names that say something, in however few photos.
     """
 
     classes: tuple[str, ...]
@@ -54,6 +55,8 @@ class PhotoWords:
     fine_of: Tensor
     asked: tuple[str, ...]
     asked_of: Tensor
+    every: tuple[str, ...]
+    every_of: Tensor
 
     @property
     def judged(self) -> tuple[str, ...]:
@@ -63,7 +66,7 @@ class PhotoWords:
     @property
     def phrases(self) -> tuple[str, ...]:
         """Everything that is asked, each once; first what is judged."""
-        return tuple(dict.fromkeys((*self.judged, *self.asked)))
+        return tuple(dict.fromkeys((*self.judged, *self.every)))
 
     def rows(self, texts: Sequence[str]) -> list[int]:
         """Places of phrases in `phrases`."""
@@ -75,6 +78,7 @@ class PhotoWords:
         """Lists for the ids of a folder, of which `photos` counts the photos of every name."""
         fine = tuple(sorted(text for text, count in photos.items() if count >= FINE_PHOTOS))
         asked = tuple(sorted(text for text, count in photos.items() if count >= ASKED_PHOTOS))
+        every = tuple(sorted(photos))
         size = max(names, default=0) + 1
 
         def table(row_of) -> Tensor:
@@ -92,6 +96,8 @@ class PhotoWords:
             fine_of=table(lambda n: _place(fine, n.text)),
             asked=asked,
             asked_of=table(lambda n: _place(asked, n.text)),
+            every=every,
+            every_of=table(lambda n: _place(every, n.text)),
         )
 
 

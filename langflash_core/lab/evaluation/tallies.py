@@ -26,7 +26,7 @@ from langflash_core.network.checkpoints.store import part_folder
 from langflash_core.resources import asset_path
 
 Item = TypeVar("Item")
-MEASURES = 3
+MEASURES = 4
 """Raised whenever a measure changes, so that what was kept before is judged anew."""
 _VALUES: dict[str, type] = {kind.__name__: kind for kind in (PoseError, Presence, ClassQuality, Panoptic)}
 _TYPES = {str(kind): kind for kind in (torch.int64, torch.float32, torch.float64, torch.bool)}

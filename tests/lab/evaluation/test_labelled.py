@@ -55,6 +55,9 @@ def test_the_truth_scores_as_the_truth(folder: PhotoFolder, program):
     assert all(row["iou"] > 0.8 for row in result["names"])
     asked = {row["name"]: row["photos"] for row in result["names"]}
     assert asked["lamp"] == 1 and asked["chair"] == 3
+    masks = {row["name"]: row["masks"] for row in result["masks"]}
+    assert masks == {"wall": 3, "floor": 3, "chair": 3, "desk": 3, "lamp": 1} and measures["masks"] == 13
+    assert measures["masks_right_atoms"] == measures["mask_names_right_features"] == 1
     # Photo 004 shows everything that may be asked, so nothing is absent from it.
     assert len(tally.scores) == 2 and all(t.float().mean() == 0.5 for t in tally.truths)
 
@@ -103,6 +106,8 @@ def test_a_wrong_name_costs_what_it_covers(folder: PhotoFolder, program, monkeyp
     assert ious["wall"] > 0.9 and ious["chair"] < 0.05 and ious["desk"] < 0.05
     papers = result["paper_ious"]["atoms"]
     assert papers["chair"] < 0.05 and papers["table"] < 0.05  # a desk is a table
+    masks = {row["name"]: (row["atoms"], row["features"]) for row in result["masks"]}
+    assert masks == {"wall": (1, 1), "floor": (1, 1), "chair": (0, 1), "desk": (0, 1)}
 
 
 def test_depth_knows_no_unit_and_a_folder_needs_no_labels(folder: PhotoFolder, program, monkeypatch):
@@ -139,7 +144,7 @@ def test_rows_of_the_paper():
 def test_words_of_a_folder():
     names = {1: Name("wall", "wall"), 5: Name("yeti", None), 7: Name("wall", "wall")}
     words = PhotoWords.of(names, {"wall": 40, "yeti": 9})
-    assert words.fine == ("wall",) and words.asked == ("wall", "yeti")
+    assert words.fine == ("wall",) and words.asked == words.every == ("wall", "yeti")
     assert words.classes_of.tolist() == [-1, 0, -1, -1, -1, -1, -1, 0]
     assert words.asked_of[5] == 1 and words.fine_of[5] == -1 and words.papers[5] == len(PAPER_LABELS) - 1
     assert words.rows(("wall", "yeti")) == [0, len(words.phrases) - 1]
