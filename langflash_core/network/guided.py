@@ -16,6 +16,7 @@ from torch import Tensor
 from torch.nn import functional as F
 
 from langflash_core.geometry.cameras import rays
+from langflash_core.geometry.vantage import leading
 from langflash_core.keeping import MATCHES
 from langflash_core.memory import give_back
 from langflash_core.network.encoders.late import LateHalf, with_taught
@@ -356,7 +357,9 @@ def _agreed(maps: DepthMaps, views: Views, poses: Poses, viewmats: Tensor, Ks: T
         found = run.kept(f"depth-{view}", lambda: {"log_depths": make().cpu().numpy()})
         return torch.from_numpy(np.array(found["log_depths"])).to(part.log_depths)
 
-    part = registered(part, [photos[v] for v in placed], viewmats[placed], Ks[placed], near, run.check, each)
+    whole = leading(part.depths, viewmats[placed])
+    greys = [photos[v] for v in placed]
+    part = registered(part, greys, viewmats[placed], Ks[placed], near, run.check, each, whole)
     part = replace(part, log_depths=in_groups(flattened, part.log_depths, part.log_errors))
     log_depths = maps.log_depths.clone()
     log_depths[placed] = part.log_depths

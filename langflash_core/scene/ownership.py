@@ -2,8 +2,8 @@
 twice.
 
 Photos come from the middle outwards: the first that sees a surface has it, and each later one takes it over
-where it sees it finer by `_FINER` than who has it. Of many photos some, spread over all, come first, and the
-others begin nothing: what they show where no owner shows the same is mostly their own error. They take over
+where it sees it finer by `_FINER` than who has it. Those that lead (`geometry.vantage`) come first, and the
+others begin nothing: what they show where no leader shows the same is mostly their own error. They take over
 and fill gaps. So all pixels that show one surface find the same photo, however many photos there are, and it
 is one that the others lie around: what its depth errs by moves little in their pictures. What stands before a
 surface that another photo knows better is given up as well (`consistency.seen_through`).
@@ -24,15 +24,13 @@ from torch.nn import functional as F
 
 from langflash_core.geometry.cameras import invert_rigid, pictured, unproject
 from langflash_core.geometry.surfels import spans
+from langflash_core.geometry.vantage import from_the_middle, leading
 
 BEHIND, BEFORE = 0.12, 0.12
 """Log depth: how far behind and before another photo's surface a pixel still shows the same one."""
 _ABOUT = 0.2  # relative depth by which what covers a cell may lie behind it
 _ALL = 8  # photos, up to which all are compared with all
 _TRIED = 8  # cells of a row and of a column, of which one is tried; and the side of a block
-_MANY, _SHARE = 9, 4
-"""Photos from which on not all begin surfaces, but one of so many. Between the photos of a room 32 as owners
-gave 26.63 dB, 16 of them 27.13, 8 of them 27.24; in four rooms of 16 and 32 photos depth is 6 % nearer."""
 _FINER = 2.0  # area that a pixel of the earlier photo covers over that of a later one which takes it over
 
 
@@ -53,7 +51,7 @@ def owned(
     known = torch.ones_like(depths, dtype=torch.bool) if known is None else known
     if len(depths) == 1:
         return known
-    first = spread(depths, viewmats, owners(len(depths)))
+    first = leading(depths, viewmats)
     order = sorted(from_the_middle(depths, viewmats), key=lambda view: view not in first)
     keep = torch.zeros_like(known)
     logs, focals = depths.log().flatten(1), Ks[:, 0, 0] if fineness is None else Ks[:, 0, 0] * fineness
@@ -64,7 +62,7 @@ def owned(
         if len(depths) > _ALL:
             tried = _tried(depths.shape[1:])
             some = points[:, tried], normals[:, tried]
-            others = _holders(view, *some, viewmats, Ks, focals, logs, known, order)
+            others = _holders(view, *some, viewmats, Ks, focals, logs, known, order, first)
         for other in others:
             area = _covered_area(points, normals, viewmats[other], focals[other])
             takes = _takes(area, finest, other in first)
@@ -74,51 +72,6 @@ def owned(
             mine = takes if other == view else mine & ~takes
         keep[view] = mine.view_as(keep[view])
     return filled(depths, viewmats, Ks, _closed(keep) & known, known)
-
-
-def owners(count: int) -> int:
-    """Of so many photos, those that own what nobody before them shows: each more has errors of its own, which
-    hang beside the surfaces of the others."""
-    return count if count < _MANY else -(-count // _SHARE)
-
-
-def spread(depths: Float[Tensor, "V H W"], viewmats: Float[Tensor, "V 4 4"], count: int) -> list[int]:
-    """`count` photos near one of which each of the V is, one by one the one that brings them nearest.
-
-    Args:
-        depths, viewmats: as `owned`.
-
-    Source: greedy k-medoids (Kaufman and Rousseeuw 1990, BUILD).
-    """
-    if count >= len(depths):
-        return [*range(len(depths))]
-    between, chosen = _between(depths, viewmats).sum(-1), []
-    nearest = torch.full_like(between[0], torch.inf)
-    for _ in range(count):
-        left = torch.minimum(nearest, between).sum(1)
-        left[chosen] = torch.inf
-        chosen.append(int(left.argmin()))
-        nearest = torch.minimum(nearest, between[chosen[-1]])
-    return sorted(chosen)
-
-
-def from_the_middle(depths: Float[Tensor, "V H W"], viewmats: Float[Tensor, "V 4 4"]) -> list[int]:
-    """All V photos by how near they are to all others, the nearest first. Of two neither is nearer: as they
-    come.
-
-    Args:
-        depths, viewmats: as `owned`.
-    """
-    if len(depths) <= 2:
-        return [*range(len(depths))]
-    return _between(depths, viewmats).sum((1, 2)).argsort(stable=True).tolist()
-
-
-def _between(depths: Tensor, viewmats: Tensor) -> Tensor:
-    """(V, V, 2) how far photos are from each other: places over the median depth; unit vectors of view."""
-    poses = invert_rigid(viewmats.double())
-    seen_at = torch.cat((poses[:, :3, 3] / depths.median(), poses[:, :3, 2]), 1)
-    return (seen_at[:, None] - seen_at).unflatten(2, (2, 3)).norm(dim=-1)
 
 
 def filled(
@@ -239,8 +192,9 @@ def _holders(
     logs: Tensor,
     known: Tensor,
     order: list[int],
+    first: list[int],
 ) -> list[int]:
-    """The photos, in their order (owners first), that have one of some points (3, n) of a view at some time,
+    """The photos, in their order (leaders first), that have one of some points (3, n) of a view at some time,
     and itself."""
     height, width = known.shape[1:]
     centres = torch.stack([invert_rigid(own)[:3, 3] for own in viewmats])
@@ -256,7 +210,7 @@ def _holders(
     gap = ahead.log() - logs.gather(1, place)
     same = inside & known.flatten(1).gather(1, place) & (gap < BEHIND) & (gap > -BEFORE)
     same[view] = True
-    finest, held, first = torch.full_like(points[0], torch.inf), [], order[: owners(len(order))]
+    finest, held = torch.full_like(points[0], torch.inf), []
     for other in order:
         takes = same[other] & _takes(areas[other], finest, other in first)
         if other == view or bool(takes.any()):

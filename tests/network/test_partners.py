@@ -56,6 +56,13 @@ def test_partners_lie_on_both_sides():
     assert all(len(of) <= PARTNERS and len(set(of)) == len(of) for of in partners(logs, viewmats, Ks))
 
 
+def test_partners_do_not_stand_together():
+    """Four almost in one place and one beside them that is worth less: the second is not of the four."""
+    logs, viewmats, Ks = ring([0.0, 9.0, 9.2, 9.4, 9.6, 16.0])
+    near = partners(logs, viewmats, Ks, count=2)[0]
+    assert near[0] in (1, 2, 3, 4) and near[1] == 5
+
+
 def test_one_surface_before_another_is_not_the_same():
     """A photo whose map has something else at the place is no partner for it."""
     logs, viewmats, Ks = ring([0.0, 10.0, 12.0])

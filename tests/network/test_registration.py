@@ -416,3 +416,13 @@ def test_many_photos_are_compared_at_half_their_size_to_the_same_depth(wrong, mo
     flows = 0.02 / min(moves(seen, view) for view in range(3))  # a hundredth of a pixel of the halves
     assert left[middle].mean() < share * off.expand_as(left)[middle].abs().mean() + flows
     assert set(sizes) == {(HEIGHT * RATIO // 2, WIDTH * RATIO // 2)}
+
+
+def test_of_many_photos_those_that_lead_are_compared_whole(monkeypatch):
+    """Bit for bit as of few; the others as if nobody led."""
+    seen = room(THREE)
+    few = seen.registered(seen.logs + bend())
+    monkeypatch.setattr(registration, "FEW", 2)
+    halved, led = (seen.registered(seen.logs + bend(), leading=of) for of in ((), [1]))
+    assert torch.equal(led[1], few[1]) and not torch.equal(led[1], halved[1])
+    assert torch.equal(led[[0, 2]], halved[[0, 2]])

@@ -10,7 +10,8 @@ for a change of depth. A smooth correction of log depth takes it over, cut where
 photo has an edge (one sparse linear system a view).
 
 Flow ends at half of the pictures' size. So many photos are halved first and it goes on to their last pixel:
-the same flow, and a quarter of the pixels that it is judged at. Their first round ends at a quarter.
+the same flow, and a quarter of the pixels that it is judged at. Their first round ends at a quarter. Those of
+them whose surfaces count most are compared whole, as few photos are.
 
 Sizes: V views, H W pixels of the maps, h w pixels of the photos.
 
@@ -19,9 +20,9 @@ Search", of OpenCV.
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
+from functools import lru_cache, partial
 from typing import Any
 
 import cv2
@@ -60,6 +61,7 @@ _EDGE = 5.0  # of 255, difference of brightness between cells from which it is c
 _ACROSS = 0.02  # what is left of it there: most edges are drawn on one surface
 _ITERATIONS = 250
 _STRIDE, _DESCENTS = 5, 8  # of flow between many photos: pixels from patch to patch, steps of each
+_AT_HAND = 64  # pictures of one size that are kept
 _MARGIN = 1.0  # pixels at the border that say nothing
 
 
@@ -142,6 +144,7 @@ def registered(
     neighbours: Neighbours | None = None,
     check: Callable[[], None] = lambda: None,
     each: Callable[[int, Callable[[], Tensor]], Tensor] = lambda view, make: make(),
+    leading: Collection[int] = (),
 ) -> DepthMaps:
     """Maps (V, H, W) whose surfaces show the same in neighbouring photos; the expected errors stay.
 
@@ -151,29 +154,28 @@ def registered(
         neighbours: of each view, the best first; None: all others.
         check: called before each comparison; what it raises ends the work.
         each: gives the map (H, W) of a view, which it may have made, or know already.
+        leading: of many photos those that are compared whole.
     """
     logs = maps.log_depths
     near = neighbours or everyone(len(logs))
     cells = (logs.shape[1], logs.shape[2])
-    size = tuple(min(_LARGEST * g, max(p, g)) for p, g in zip(photos[0].shape, cells, strict=True))
+    height, width = (min(_LARGEST * g, max(p, g)) for p, g in zip(photos[0].shape, cells, strict=True))
+    size, half = (height, width), (height // 2, width // 2)
     if min(size) < _SMALLEST:
         return maps
     guides = [_resized(photo, cells).astype(np.float32) for photo in photos]
-    many = len(logs) > FEW
-    half = (size[0] // 2, size[1] // 2)
-    if many and min(half) >= _SMALLEST:
-        coarse = _Pictures.of(photos, half, Ks, cells, _COARSE)
-        fine = replace(coarse, care=_FINE)
-    else:
-        coarse = fine = _Pictures.of(photos, size, Ks, cells, _WHOLE)
+    halved = len(logs) > FEW and min(half) >= _SMALLEST
+    whole, coarse = (_Pictures.of(photos, *of, Ks, cells) for of in ((size, _WHOLE), (half, _COARSE)))
+    fine = replace(coarse, care=_FINE)
 
     def corrected(view: int) -> Tensor:
         own, others = logs[view].cpu(), near[view]
-        rounds = zip(_ROUNDS, (coarse, fine), strict=True) if len(others) > 1 else [(1, fine)]
+        of_rounds = (coarse, fine) if halved and view not in leading else (whole, whole)
+        rounds = zip(_ROUNDS, of_rounds, strict=True) if len(others) > 1 else [(1, of_rounds[-1])]
         for partners, pictures in rounds:
             target, weight = torch.zeros(2, *cells)
             depths = F.interpolate(own[None, None], size=pictures.size, mode="bilinear")[0, 0]
-            known = _Known.of(pictures.greys[view])
+            known = _Known.of(pictures.grey(view))
             for other in others[:partners]:
                 check()
                 pose = (viewmats[other] @ invert_rigid(viewmats[view])).cpu()
@@ -189,37 +191,37 @@ def registered(
 
 @dataclass(frozen=True)
 class _Pictures:
-    """Photos (h, w) uint8 of one size, their intrinsics (V, 3, 3) there, and how they are compared."""
+    """Photos (h, w) uint8 of one size, by their numbers, their intrinsics (V, 3, 3) there, and how they are
+    compared."""
 
-    greys: list[np.ndarray]
+    grey: Callable[[int], np.ndarray]
+    size: tuple[int, int]
     Ks: Tensor
     care: _Care
 
     @staticmethod
     def of(
-        photos: Sequence[np.ndarray], size: tuple[int, ...], Ks: Tensor, cells: tuple[int, int], care: _Care
+        photos: Sequence[np.ndarray], size: tuple[int, int], care: _Care, Ks: Tensor, cells: tuple[int, int]
     ) -> "_Pictures":
         """Ks: pixels of maps of so many cells."""
-        greys = [photo if photo.shape == size else _resized(photo, size) for photo in photos]
         ratio = torch.tensor([size[1] / cells[1], size[0] / cells[0], 1.0])
-        return _Pictures(greys, Ks.cpu() * ratio[:, None], care)
-
-    @property
-    def size(self) -> tuple[int, int]:
-        return self.greys[0].shape[0], self.greys[0].shape[1]
+        grey = lru_cache(_AT_HAND)(lambda view: _resized(photos[view], size))
+        return _Pictures(grey, size, Ks.cpu() * ratio[:, None], care)
 
     def compared(
         self, view: int, other: int, depths: Tensor, known: _Known, pose: Tensor
     ) -> tuple[Tensor, Tensor]:
         """Changes of log depth (h, w) that another photo asks for, and what each counts; depths: log, (h,
         w)."""
-        greys, Ks = (self.greys[view], self.greys[other]), (self.Ks[view], self.Ks[other])
+        greys, Ks = (self.grey(view), self.grey(other)), (self.Ks[view], self.Ks[other])
         matches = _matched(depths, *greys, *Ks, pose, self.care, known)
         change, moved = _triangulated(depths, matches, *Ks, pose, known)
         return change, torch.from_numpy(matches.sure) * moved / (self.care.flow_error**2 * _ONE_SHIFT)
 
 
-def _resized(photo: np.ndarray, size: tuple[int, ...]) -> np.ndarray:
+def _resized(photo: np.ndarray, size: tuple[int, int]) -> np.ndarray:
+    if photo.shape == size:
+        return photo
     method = cv2.INTER_AREA if size[0] < photo.shape[0] else cv2.INTER_CUBIC
     return cv2.resize(photo, (size[1], size[0]), interpolation=method)
 
