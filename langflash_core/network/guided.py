@@ -39,7 +39,7 @@ from langflash_core.network.semantics.grouping import (
 from langflash_core.network.semantics.naming import PartNamer, describe, places
 from langflash_core.network.semantics.splitting import condensed, joint_maps, split_groups, split_maps
 from langflash_core.network.stereo.adjustment import Sought
-from langflash_core.network.stereo.agreement import agreed
+from langflash_core.network.stereo.agreement import agreed, met
 from langflash_core.network.stereo.alignment import Correction
 from langflash_core.network.stereo.inputs import grown
 from langflash_core.network.stereo.keypoints import KeyPoints, decoded, match_photos, match_sources
@@ -50,7 +50,7 @@ from langflash_core.network.stereo.prior import DepthHead, DepthMaps
 from langflash_core.network.stereo.registration import registered
 from langflash_core.network.stereo.retrieval import most_alike
 from langflash_core.network.stereo.sharpening import sharpened
-from langflash_core.network.stereo.sweep import DepthRefiner
+from langflash_core.network.stereo.sweep import DepthRefiner, everyone
 from langflash_core.running import Run
 from langflash_core.types import Gaussians, Views
 
@@ -281,7 +281,7 @@ class GuidedDepthNet(LangFlashNet):
             agreed_maps = _agreed(maps, views, poses, viewmats[0], Ks[0], run)
             if agreed_maps is not maps:  # what moved lies beside its edges
                 sharp = _one_by_one(sharpened, agreed_maps.log_depths, images[0])
-                maps = replace(agreed_maps, log_depths=sharp)
+                maps = _met(replace(agreed_maps, log_depths=sharp), poses, viewmats[0], Ks[0])
         if not elements:
             return _geometry(Gaussians.none(), maps, poses, viewmats[0], Ks[0], views)
         with run.stage("Gaussians"):
@@ -363,6 +363,25 @@ def _agreed(maps: DepthMaps, views: Views, poses: Poses, viewmats: Tensor, Ks: T
     part = replace(part, log_depths=in_groups(flattened, part.log_depths, part.log_errors))
     log_depths = maps.log_depths.clone()
     log_depths[placed] = part.log_depths
+    return replace(maps, log_depths=log_depths)
+
+
+def _met(maps: DepthMaps, poses: Poses, viewmats: Tensor, Ks: Tensor) -> DepthMaps:
+    """Maps (V, H, W); those of three photos of known pose and more lie on each other, of many on those of
+    their partners and of the photos that lead, which have most surfaces."""
+    placed = [v for v in range(len(viewmats)) if v not in poses.guessed]
+    if len(placed) < 3:
+        return maps
+    logs, cameras = maps.log_depths[placed], (viewmats[placed], Ks[placed])
+    near = everyone(len(placed))
+    if len(placed) > FEW:
+        first = leading(logs.exp(), cameras[0])
+        near = [
+            [*of, *(v for v in first if v not in (own, *of))]
+            for own, of in enumerate(partners(logs, *cameras))
+        ]
+    log_depths = maps.log_depths.clone()
+    log_depths[placed] = met(logs, *cameras, near)
     return replace(maps, log_depths=log_depths)
 
 

@@ -115,12 +115,32 @@ def test_the_finer_one_wins_from_twice_the_area_on(earlier, nearer, wins):
     assert keep[far_at][~common].all()  # what the nearer does not see
 
 
+@pytest.mark.parametrize("turns", [(0.0, 0.3), (0.0, 0.3, -0.3), (0.0, 0.1, 0.2, 0.3)])
+def test_the_border_of_a_photo_takes_nothing_over(turns, monkeypatch):
+    """Of more than two: where another photo's picture ends both stay, that no crack opens between them."""
+    given = seen([camera(turn=(turn, 0.0)) for turn in turns])
+    everybody_leads(monkeypatch)
+    monkeypatch.setattr(ownership, "_closed", lambda cells: cells)
+    left, border = ~owned(*given), ownership._BORDER if len(turns) > 2 else 0
+
+    def within(view: int, margin: float) -> Tensor:
+        """Cells that lie in another picture, so far from its border."""
+        others = [inside(*given, view, other, margin) for other in range(len(turns)) if other != view]
+        return torch.stack(others).any(0)
+
+    assert left.any()
+    assert not any(bool((left[view] & ~within(view, border - 1e-4)).any()) for view in range(len(turns)))
+    assert any(bool((left[view] & ~within(view, border + 1)).any()) for view in range(len(turns)))
+
+
 @pytest.mark.parametrize(("fineness", "wins"), [(1.5, True), (1.3, False)])
 @pytest.mark.parametrize("views", [2, 3, 10])
 def test_a_larger_photo_is_finer(fineness, wins, views):
     """Of photos from one place the last has so many more pixels in a row: their square is what counts."""
     given = seen([camera()] * views)
     keep = owned(*given, fineness=torch.tensor([1.0] * (views - 1) + [fineness]))
+    border = slice(None) if views == 2 else slice(4, -4)  # where others take nothing over, and a crumb
+    keep = keep[:, border, border]
     assert keep[-1].all() == wins and keep[0].all() != wins and not keep[1:-1].any()
 
 
@@ -273,10 +293,10 @@ def plain_owner(depths: np.ndarray, viewmats: np.ndarray, Ks: np.ndarray, view: 
     pose = np.linalg.inv(viewmats[view])
     point = pose[:3, :3] @ point_of(depths[view], Ks[view], y, x) + pose[:3, 3]
     normal = pose[:3, :3] @ normal_of(depths[view], Ks[view], y, x)
-    owner, finest = -1, math.inf
+    owner, finest, border = -1, math.inf, 2 if len(depths) > 2 else 0
     for other in plain_order(depths, viewmats):
         at = viewmats[other][:3, :3] @ point + viewmats[other][:3, 3]
-        if other != view and not same_surface(at, depths[other], Ks[other]):
+        if other != view and not same_surface(at, depths[other], Ks[other], border):
             continue
         towards = point - np.linalg.inv(viewmats[other])[:3, 3]
         distance = np.linalg.norm(towards)
@@ -319,11 +339,11 @@ def normal_of(depths: np.ndarray, K: np.ndarray, y: int, x: int) -> np.ndarray:
     return crossed / np.linalg.norm(crossed)
 
 
-def same_surface(at: np.ndarray, depths: np.ndarray, K: np.ndarray) -> bool:
+def same_surface(at: np.ndarray, depths: np.ndarray, K: np.ndarray, border: int) -> bool:
     if at[2] <= 0:
         return False
     column, row = (math.floor(at[i] / at[2] * K[i, i] + K[i, 2]) for i in (0, 1))
-    if not (0 <= row < HEIGHT and 0 <= column < WIDTH):
+    if not (border <= row < HEIGHT - border and border <= column < WIDTH - border):
         return False
     return -BEFORE < math.log(at[2]) - math.log(depths[row, column]) < BEHIND
 
