@@ -27,7 +27,7 @@ _SCALE = 0.04  # relative difference from which a pixel speaks less and less (Ge
 _INDEPENDENT = 200  # pixels go together: all compared ones count as this many a view
 _EXPECTED = 0.075  # of a knot, where nothing is compared
 _BEND = 0.06  # of a knot against its neighbour
-_MEETINGS = 2  # rounds, after which what is left between two maps is a bilinear one's error
+_MEETINGS = 2  # rounds: .0372 of error of 16 maps (900000000) becomes .0359, .0356, .0357
 _SAME = 0.06  # maps that differ by less, relatively, show one surface
 
 
