@@ -75,7 +75,7 @@ def met(
 ) -> Float[Tensor, "V H W"]:
     """Log depths (V, H, W) that lie on each other where they show one surface: nothing is bent, and each says
     as much, so that all photos which see a place take the same mean. Twice: the means of those that do not
-    see the same photos differ. Arguments as `agreed`.
+    see the same photos differ. Arguments and source as `agreed`.
     """
     for _ in range(_MEETINGS):
         log_depths = blended(log_depths, torch.zeros_like(log_depths), viewmats, Ks, neighbours)
