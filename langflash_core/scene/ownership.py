@@ -31,7 +31,7 @@ BEHIND, BEFORE = 0.12, 0.12
 _ABOUT = 0.2  # relative depth by which what covers a cell may lie behind it
 _ALL = 8  # photos, up to which all are compared with all
 _TRIED = 8  # cells of a row and of a column, of which one is tried; and the side of a block
-_BORDER = 2  # cells, at a photo's border, that take nothing over
+_BORDER = 2  # cells, at the border of a photo that leads, that take nothing over
 _FINER = 2.0  # area that a pixel of the earlier photo covers over that of a later one which takes it over
 
 
@@ -54,7 +54,7 @@ def owned(
         return known
     first = leading(depths, viewmats)
     order = sorted(from_the_middle(depths, viewmats), key=lambda view: view not in first)
-    keep, takers = torch.zeros_like(known), _takers(known)
+    keep, takers = torch.zeros_like(known), _takers(known, first)
     logs, focals = depths.log().flatten(1), Ks[:, 0, 0] if fineness is None else Ks[:, 0, 0] * fineness
     for view in range(len(depths)):
         points, normals = _surface(depths[view], viewmats[view], Ks[view])
@@ -75,15 +75,18 @@ def owned(
     return filled(depths, viewmats, Ks, _closed(keep) & known, known)
 
 
-def _takers(known: Tensor) -> Tensor:
+def _takers(known: Tensor, first: list[int]) -> Tensor:
     """(V, H, W) bool: the cells by which a photo takes something over. Of more than two photos not those at
-    its border: a depth that is a little off has another photo's cells there which it does not show, and a
-    crack opens between both, seen from aside."""
+    the border of one that leads: a depth that is a little off has another photo's cells there which it does
+    not show, and a crack opens between both, seen from aside."""
     if len(known) <= 2:
         return known
-    inner = torch.zeros_like(known)
-    inner[:, _BORDER:-_BORDER, _BORDER:-_BORDER] = known[:, _BORDER:-_BORDER, _BORDER:-_BORDER]
-    return inner
+    takers = known.clone()
+    takers[first] = False
+    inner = (slice(_BORDER, -_BORDER), slice(_BORDER, -_BORDER))
+    for view in first:
+        takers[view][inner] = known[view][inner]
+    return takers
 
 
 def filled(

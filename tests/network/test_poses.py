@@ -5,7 +5,7 @@ import pytest
 from scipy.optimize import least_squares
 from scipy.spatial.transform import Rotation
 
-from langflash_core.network.stereo import matching
+from langflash_core.network.stereo import matching, poses
 from langflash_core.network.stereo.keypoints import KeyPoints
 from langflash_core.network.stereo.matching import (
     Matches,
@@ -170,3 +170,33 @@ def test_a_photo_with_nothing_to_tell_places_by_is_not_placed(seen, guessed):
     positions = np.full((100, 2), 50.0), np.full((seen, 2), 50.0)
     found = estimate_poses([view, view], KeyPoints(positions, {(0, 1): np.zeros((0, 2), int)}))
     assert found.guessed == guessed
+
+
+@pytest.mark.parametrize("tried", [1, 2, 4])
+def test_where_the_best_pair_does_not_connect_photos_the_next_best_is_asked(tried, monkeypatch):
+    """0-1 and 2-3 belong together; between them 1-2 match best and have no pose, then 0-2, which have one."""
+    counts = {(0, 1): 90, (2, 3): 80, (1, 2): 30, (0, 2): 20, (0, 3): 10}
+    edges = {
+        edge: Matches(np.zeros((count, 2)), np.zeros((count, 2)), 0.01) for edge, count in counts.items()
+    }
+    flat = np.ones((4, 6), np.float32)
+    views = [PoseInput(np.eye(3), (6, 4), flat, flat[None]) for _ in range(4)]
+    asked = []
+
+    def posed(view_i, view_j, matches):
+        edge = (
+            next(i for i in range(4) if views[i] is view_i),
+            next(j for j in range(4) if views[j] is view_j),
+        )
+        asked.append(edge)
+        dense = asked.count(edge) == 2
+        if edge not in ((0, 1), (2, 3)) and (not dense or edge == (1, 2)):
+            return None
+        return RelativePose(np.eye(3), np.zeros(3), 0.0, np.ones(len(matches), bool), 1.0, np.eye(7))
+
+    monkeypatch.setattr(poses, "_pair_pose", posed)
+    monkeypatch.setattr(poses, "dense_matches", lambda *of: Matches(np.zeros((0, 2)), np.zeros((0, 2)), 0.01))
+    monkeypatch.setattr(poses, "_BRIDGES", tried)
+    found, agreed = poses._pair_poses(views, edges, lambda: None)
+    assert asked[5:] == [(1, 2), (0, 2)][:tried] and set(agreed) == set(found)
+    assert set(found) == {(0, 1), (2, 3), *([(0, 2)] if tried > 1 else [])}

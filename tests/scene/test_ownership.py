@@ -133,6 +133,17 @@ def test_the_border_of_a_photo_takes_nothing_over(turns, monkeypatch):
     assert any(bool((left[view] & ~within(view, border + 1)).any()) for view in range(len(turns)))
 
 
+@pytest.mark.parametrize("leads", [True, False])
+def test_one_that_does_not_lead_takes_over_up_to_its_border(leads, monkeypatch):
+    """Of frames a finger apart each would keep its own border else, where the next one takes it."""
+    far, near = camera(), camera((0.0, 0.0, 3 - 3 / 2.2))
+    given = seen([far, near, far], fov=20)
+    monkeypatch.setattr(ownership, "leading", lambda *of: [0, 1] if leads else [0])
+    monkeypatch.setattr(ownership, "_closed", lambda cells: cells)
+    border = inside(*given, view=0, other=1) & ~inside(*given, view=0, other=1, margin=ownership._BORDER)
+    assert border.any() and (owned(*given)[0][border] == leads).all()
+
+
 @pytest.mark.parametrize(("fineness", "wins"), [(1.5, True), (1.3, False)])
 @pytest.mark.parametrize("views", [2, 3, 10])
 def test_a_larger_photo_is_finer(fineness, wins, views):

@@ -44,6 +44,7 @@ _ENOUGH = 100  # matches with one of them
 _OTHER_LENS = 0.05  # change of a focal length, as a logarithm, from which pairs are looked at again
 _DENSE_COST = 2.75
 """Cost from which dense matches are not believed: on validation rooms the wrong ones began at 2.8."""
+_BRIDGES = 4  # pairs that are tried, at most, where photos fall apart
 
 
 @dataclass(frozen=True)
@@ -259,14 +260,18 @@ def _pair_poses(
         if pose is not None:
             (pairs if pose.num_inliers >= _FEW else weak)[i, j] = pose
             agreed[i, j] = matches.subset(pose.inliers)
-    for i, j in unconnected(len(views), pairs, {edge: len(matches) for edge, matches in edges.items()}):
-        check()
-        more = with_dense(edges[i, j], dense_matches(views[i], views[j]))
-        better = _pair_pose(views[i], views[j], more)
-        if better is not None and better.cost < _DENSE_COST:
-            pairs[i, j], agreed[i, j] = better, more.subset(better.inliers)
-        elif (i, j) in weak:
-            pairs[i, j] = weak[i, j]
+    counts = {edge: len(matches) for edge, matches in edges.items()}
+    for _ in range(_BRIDGES):
+        for i, j in unconnected(len(views), pairs, counts):
+            check()
+            more = with_dense(edges[i, j], dense_matches(views[i], views[j]))
+            better = _pair_pose(views[i], views[j], more)
+            if better is not None and better.cost < _DENSE_COST:
+                pairs[i, j], agreed[i, j] = better, more.subset(better.inliers)
+            elif (i, j) in weak:
+                pairs[i, j] = weak[i, j]
+            else:
+                del counts[i, j]  # the next best of these photos is asked
     return pairs, {edge: agreed[edge] for edge in pairs}
 
 
