@@ -81,11 +81,9 @@ def _takers(known: Tensor, first: list[int]) -> Tensor:
     not show, and a crack opens between both, seen from aside."""
     if len(known) <= 2:
         return known
-    takers = known.clone()
-    takers[first] = False
-    inner = (slice(_BORDER, -_BORDER), slice(_BORDER, -_BORDER))
-    for view in first:
-        takers[view][inner] = known[view][inner]
+    inner, takers = torch.zeros_like(known[0]), known.clone()
+    inner[_BORDER:-_BORDER, _BORDER:-_BORDER] = True
+    takers[first] = known[first] & inner
     return takers
 
 

@@ -44,7 +44,7 @@ _ENOUGH = 100  # matches with one of them
 _OTHER_LENS = 0.05  # change of a focal length, as a logarithm, from which pairs are looked at again
 _DENSE_COST = 2.75
 """Cost from which dense matches are not believed: on validation rooms the wrong ones began at 2.8."""
-_BRIDGES = 4  # pairs that are tried, at most, where photos fall apart
+_BRIDGES = 4  # pairs that are asked, at most, to connect two parts: ten place no photo of four walks more
 
 
 @dataclass(frozen=True)
