@@ -22,6 +22,7 @@ EXTRAS = {
     "transformers": "sam2",
     "pycolmap": "colmap",
     "anywidget": "notebook",
+    "ai_edge_litert": "opinions",
 }
 """Top-level import name -> extra in pyproject.toml."""
 

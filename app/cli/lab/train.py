@@ -9,7 +9,9 @@ from pathlib import Path
 from typing import Any, TextIO
 
 from langflash_core.errors import InputError, WeightsError
+from langflash_core.extras import optional_packages
 from langflash_core.files import check_folder, check_output_file, readable_file
+from langflash_core.lab.labels.opinions import LiteNetwork, write_opinions
 from langflash_core.lab.labels.outlines import write_outlines
 from langflash_core.lab.labels.prompted import PromptedSam
 from langflash_core.lab.photos import chosen_ids, open_folder
@@ -52,6 +54,7 @@ def run(args: Namespace, out: TextIO) -> None:
         "parts": _parts,
         "late": _late,
         "outlines": _outlines,
+        "opinions": _opinions,
         "run": _run,
         "export": _export,
     }[args.action](args, out)
@@ -122,6 +125,15 @@ def _outlines(args: Namespace, out: TextIO) -> None:
     print(f"{args.output}: {len(ids)} photos outlined", file=out)
 
 
+def _opinions(args: Namespace, out: TextIO) -> None:
+    readable_file(args.weights, "TensorFlow Lite network", WeightsError)
+    folder = opened_folder(args)
+    with optional_packages():
+        network = LiteNetwork(args.weights)
+    count = write_opinions(folder, folder.ids[args.part[0] :: args.part[1]], network)
+    print(f"{args.folder / 'opinions'}: {count} new photos", file=out)
+
+
 def _parts(args: Namespace, out: TextIO) -> None:
     if not args.cache.is_dir():
         raise InputError(f"there is no folder {args.cache}; make it with langflash train cache")
@@ -141,6 +153,10 @@ def _late(args: Namespace, out: TextIO) -> None:
     if args.twice and not args.more:
         raise InputError(
             "--twice teaches with other sets of photos beside the labelled ones; name some with --more"
+        )
+    if args.names and (args.twice or not args.more):
+        raise InputError(
+            "--names goes with --more and without --twice; name other sets of photos with --more"
         )
     more = [open_folder(place) for place in args.more]
     learned = chosen_ids(folder.ids, "train")
@@ -162,6 +178,7 @@ def _late(args: Namespace, out: TextIO) -> None:
             ),
             more=more,
             twice=args.twice,
+            names=args.names,
             preset=args.preset,
         )
         if leads():
@@ -258,7 +275,12 @@ def _export(args: Namespace, out: TextIO) -> None:
     check_output_file(args.output, (".safetensors",))
     details = None if args.metadata is None else _details(args.metadata)
     path = run_export(
-        args.run, args.output, _start_of(args, args.preset), preset=args.preset, metadata=details
+        args.run,
+        args.output,
+        _start_of(args, args.preset),
+        preset=args.preset,
+        metadata=details,
+        named=args.named,
     )
     print(f"{path}: {path.stat().st_size / 1e6:.1f} MB", file=out)
 

@@ -5,7 +5,7 @@ from pathlib import Path
 
 from langflash_core.network.presets import PRECISIONS
 
-from ..values import above_zero, minutes, part, seed, size, whole_count
+from ..values import above_zero, minutes, part, seed, share, size, whole_count
 from .shared import add_description, add_json, add_output, new_actions, new_command
 
 # langflash_core.lab.photos.layouts.LAYOUTS, which would bring torch along.
@@ -127,6 +127,7 @@ def add_train(commands) -> None:
     _add_cache(actions)
     _add_convert(actions)
     _add_outlines(actions)
+    _add_opinions(actions)
     parts = new_command(actions, "parts", "find the parts of cached rooms, for the stage naming")
     parts.add_argument("cache", type=Path, metavar="CACHE", help="made by train cache")
     parts.add_argument(
@@ -142,6 +143,13 @@ def add_train(commands) -> None:
     export.add_argument("run", type=Path, metavar="RUN")
     add_output(export, "FILE", "the .safetensors to write")
     export.add_argument("--metadata", type=Path, metavar="JSON", help="an object to add to the model card")
+    export.add_argument(
+        "--named",
+        type=share,
+        default=1.0,
+        metavar="SHARE",
+        help="what the namer's corrections count of what it learned (default: 1)",
+    )
     _add_start(export, presets=("mini", "full"))
 
 
@@ -222,6 +230,26 @@ def _add_stages(actions) -> None:
     _add_start(run, presets=("mini", "full"))
 
 
+def _add_opinions(actions) -> None:
+    command = new_command(
+        actions,
+        "opinions",
+        "keep beside photos what another network says of them, for train late --more; what is done stays",
+    )
+    command.add_argument("folder", type=Path, metavar="FOLDER", help="photos, as train photos makes them")
+    add_description(command)
+    command.add_argument(
+        "--weights",
+        type=Path,
+        required=True,
+        metavar="FILE",
+        help="the network, .tflite: scores of names a pixel",
+    )
+    command.add_argument(
+        "--part", type=part, default=(0, 1), metavar="I/N", help="the I-th of N processes, from 0"
+    )
+
+
 def _add_outlines(actions) -> None:
     command = new_command(
         actions, "outlines", "outline what could be an object in photos without labels; what is done stays"
@@ -270,6 +298,11 @@ def _add_late(actions) -> None:
         metavar="FOLDER",
         help="other photos, labelled, in part or not at all: learning goes on from what the weights have, "
         "and an average of the weights teaches what nobody labelled",
+    )
+    late.add_argument(
+        "--names",
+        action="store_true",
+        help="with --more: names alone learn, depth stays as it is: a third more steps in the same time",
     )
     late.add_argument(
         "--twice",

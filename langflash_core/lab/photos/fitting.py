@@ -23,12 +23,13 @@ SMALLEST_WINDOW = 0.5
 @dataclass(frozen=True)
 class FittedPhoto:
     """rgb (3, H, W) uint8; labels (H, W) int64, 0 = not labelled; depths (H, W) float32, 0 = unknown;
-    K (3, 3)."""
+    K (3, 3); opinions (H, W) int64, -1 = none."""
 
     rgb: Tensor
     labels: Tensor
     depths: Tensor
     K: Tensor
+    opinions: Tensor
 
 
 def network_size(photo: LabelledPhoto, area: int, multiple: int) -> tuple[int, int]:
@@ -55,11 +56,13 @@ def fitted(
     empty = np.zeros((height, width), dtype=np.float32)
     labels = seen_through(empty.astype(np.int64) if photo.labels is None else photo.labels, box, size)
     depths = seen_through(empty if photo.depths is None or not photo.metric else photo.depths, box, size)
+    silent = empty.astype(np.int64) - 1
+    opinions = seen_through(silent if photo.opinions is None else photo.opinions, box, size)
     if mirrored:
-        rgb, labels, depths = rgb.flip(-1), labels.flip(-1), depths.flip(-1)
+        rgb, labels, depths, opinions = (map.flip(-1) for map in (rgb, labels, depths, opinions))
         K = K.clone()
         K[0, 2] = size[0] - K[0, 2]
-    return FittedPhoto(rgb, labels, depths, K)
+    return FittedPhoto(rgb, labels, depths, K, opinions)
 
 
 def drawn_window(photo: LabelledPhoto, size: tuple[int, int], seed: int) -> tuple[Box, bool]:

@@ -6,6 +6,7 @@
     depths/ID.png              z in steps of `depth_unit`, 0 = unknown (optional)
     K.txt                      3 x 3, pixels of the photos as stored, the same for all (optional), or
     intrinsics.csv             id, fx, fy, cx, cy
+    opinions/ID.png            what another network says, 8 bits (optional; lab/labels/opinions.py)
     poses.txt                  ID and 16 numbers, camera to world, row by row, OpenCV axes (optional)
     photos.json                {"crop": [left, top, right, bottom], "depth_unit": metres, "source": "",
                                "terms": ""}, all optional
@@ -50,7 +51,8 @@ class LabelledPhoto:
     """One photo after the crop.
 
     image (H, W, 3) uint8; labels (H, W) int64 ids, 0 = not labelled; depths (H, W) float32, 0 = unknown;
-    metric: the depths are metres; K (3, 3) pixels; pose (4, 4), camera to world. None: not known.
+    metric: the depths are metres; K (3, 3) pixels; pose (4, 4), camera to world; opinions (H, W) int64.
+    None: not known.
     """
 
     id: str
@@ -60,6 +62,7 @@ class LabelledPhoto:
     metric: bool = False
     K: Tensor | None = None
     pose: Tensor | None = None
+    opinions: np.ndarray | None = None
 
     @property
     def intrinsics(self) -> tuple[float, float, float, float] | None:
@@ -149,6 +152,18 @@ class PhotoFolder:
             unit = MILLIMETRE
         return steps.astype(np.float32) * (1.0 if unit is None else unit), unit is not None
 
+    def opinions(self, id: str, size: tuple[int, int]) -> np.ndarray | None:
+        """What another network says of a photo, after the crop, (H, W) int64 at `size`; None: nothing.
+
+        Raises:
+            InputError: the map is damaged.
+        """
+        path = self.root / "opinions" / f"{id}.png"
+        if not path.is_file():
+            return None
+        values = read_map(path, "map of opinions").astype(np.int64)
+        return values[np.ix_(*(np.arange(n) * m // n for n, m in zip(size, values.shape, strict=True)))]
+
     def photo(self, id: str) -> LabelledPhoto:
         """Everything about one photo.
 
@@ -173,6 +188,7 @@ class PhotoFolder:
             metric=metric,
             K=K if K is None or self.crop is None else _moved(K, self.crop),
             pose=None if self.poses is None else self.poses.get(id),
+            opinions=self.opinions(id, (image.shape[0], image.shape[1])),
         )
 
 

@@ -58,6 +58,8 @@ class NameBank:
     """texts: the N names; vectors (N, C) and classes (37, C): unit texts; balance (37,): what a pixel of a
     class counts; class_of and name_of: by set, rows by id, -1 = none; against (S, N, N) bool: where a set
     says the first, it denies the second (a name does not deny its kinds, nor what the set does not name).
+    of_text (N,): the row of `heard` that a name belongs to; evidence (257, 38): of what another network says,
+    for each class and anything else (`heard`), None where it says nothing.
     """
 
     texts: tuple[str, ...]
@@ -67,9 +69,15 @@ class NameBank:
     class_of: tuple[Tensor, ...]
     name_of: tuple[Tensor, ...]
     against: Tensor
+    of_text: Tensor | None = None
+    evidence: Tensor | None = None
 
     @staticmethod
-    def of(sets: Sequence[NamedSet], encode: Callable[[Sequence[str]], Tensor]) -> "NameBank":
+    def of(
+        sets: Sequence[NamedSet],
+        encode: Callable[[Sequence[str]], Tensor],
+        evidence: Tensor | None = None,
+    ) -> "NameBank":
         """All names that `MIN_PHOTOS` show, and the 37 classes."""
         counts: Counter[str] = Counter()
         for one in sets:
@@ -88,7 +96,28 @@ class NameBank:
             tuple(classes for classes, _ in rows),
             tuple(names for _, names in rows),
             torch.stack([_denied(one, at, names) for one, (_, names) in zip(sets, rows, strict=True)]),
+            _classes_of(sets, texts),
+            evidence,
         )
+
+    def heard(self, said: Tensor) -> tuple[Tensor, Tensor] | None:
+        """Evidence of what another network says (...), in nats, for the 37 classes (..., 37) and for all
+        names (..., N); None: it says nothing."""
+        if self.evidence is None or self.of_text is None:
+            return None
+        found = self.evidence.to(said.device)[said]  # -1 is the last row
+        return found[..., :-1], found[..., self.of_text.to(said.device)]
+
+
+def _classes_of(sets: Sequence[NamedSet], texts: Sequence[str]) -> Tensor:
+    """Rows (N,) of the classes of names, by the first set that has them; the last row for anything else."""
+    found = {text: row for row, text in enumerate(CLASSES37)}
+    for one in sets:
+        for name in one.names.values():
+            label = photo_label(name)
+            if label is not None and name.label in CLASSES37:
+                found.setdefault(label.name, CLASSES37.index(name.label))
+    return torch.tensor([found.get(text, len(CLASSES37)) for text in texts])
 
 
 def _rows(one: NamedSet, at: Mapping[str, int], frequent: set[str]) -> tuple[Tensor, Tensor]:

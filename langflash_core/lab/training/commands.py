@@ -26,6 +26,7 @@ from langflash_core.lab.training.cache import (
     rooms_renderer,
 )
 from langflash_core.lab.training.dense import DenseSet
+from langflash_core.lab.training.fewlabels import NAMES_ALONE
 from langflash_core.lab.training.frozen import FrozenSet
 from langflash_core.lab.training.further import Sets, judge_of, train_few, train_twice
 from langflash_core.lab.training.live import LivePhotos
@@ -199,6 +200,7 @@ def run_late(
     *,
     more: Sequence[PhotoFolder] = (),
     twice: bool = False,
+    names: bool = False,
     preset: str = "mini",
 ) -> LoopState:
     """Train the late halves, and the heads that read them, on labelled photos and the cached rooms.
@@ -207,7 +209,8 @@ def run_late(
         ids: of the photos to learn from. kept: of those to judge by now and then. start: weights file that
             the run begins with. more: other sets, labelled, in part or not at all; with them the late halves
             go on from what the weights have instead of beginning anew (`fewlabels`). twice: what the
-            weights say of mirrored and larger photos teaches them (`twice`), instead of their average.
+            weights say of mirrored and larger photos teaches them (`twice`), instead of their average. names:
+            nothing is learned of depth.
 
     Raises:
         InputError: no cache, or a photo cannot be used.
@@ -220,8 +223,11 @@ def run_late(
         if kept:
             judge = judge_of(photos, kept, encode, options.device)
         rooms.tokens = False  # of the frozen half alone, which is run with the others
-        train = train_twice if twice else train_few
-        return train(network, sets, rooms, phrase_table(folder, encode), run_dir, options, judge)
+        table = phrase_table(folder, encode)
+        if twice:
+            return train_twice(network, sets, rooms, table, run_dir, options, judge)
+        weights = NAMES_ALONE if names else None
+        return train_few(network, sets, rooms, table, run_dir, options, judge, weights)
     live = LivePhotos(photos, ids)
     words = Words(PhraseSampler(phrase_table(folder, encode)), torch.Generator().manual_seed(options.seed))
     targets = PhotoTargets.of(photos, live, encode)

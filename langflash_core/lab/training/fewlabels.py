@@ -37,6 +37,8 @@ from langflash_core.network.layers.dpt import double
 
 RATES = {"late": 0.25, "deep": 0.25, "decoder": 0.4, "depth_head": 0.4, "averaged": 0.0}
 """Of the stage's rate."""
+DEPTH = ("deep", "decoder", "depth_head")
+"""What learns depth alone."""
 TEMPERATURE = 16.0
 """Factor on cosines in every softmax."""
 HIDDEN = 0.1
@@ -66,6 +68,15 @@ class Weights:
     depth: float = 1.0
     said_depth: float = 0.3
     rooms: float = 0.5
+
+    @property
+    def deep(self) -> bool:
+        """Whether anything is said of depth."""
+        return self.depth > 0 or self.said_depth > 0
+
+
+NAMES_ALONE = Weights(depth=0.0, said_depth=0.0)
+"""Depth stays as it is: more steps in the same time, and its half reads no names."""
 
 
 @dataclass(frozen=True)
@@ -148,27 +159,34 @@ class Averaged(nn.Module):
         return min(most, int(self.age) / (9 + int(self.age)))
 
     @torch.no_grad()
-    def looks(self, network: GuidedDepthNet, images: Tensor, Ks: Tensor) -> tuple[Tensor, Tensor]:
-        """What its last layer reads of photos (B, 1, 3, H, W), (B, h, w, F), and their log depths (B, H, W):
-        means of the photos as they are and mirrored. (The last layer is linear.)"""
+    def looks(
+        self, network: GuidedDepthNet, images: Tensor, Ks: Tensor, *, deep: bool = True
+    ) -> tuple[Tensor, Tensor | None]:
+        """What its last layer reads of photos (B, 1, 3, H, W), (B, h, w, F), and where it is asked for their
+        log depths (B, H, W): means of the photos as they are and mirrored. (The last layer is linear.)"""
         self.eval()
-        own, other = self._look(network, images, Ks), self._look(network, *mirrored(images, Ks))
-        return (own[0] + other[0].flip(2)) / 2, (own[1] + other[1].flip(-1)) / 2
+        seen, logs = self._look(network, images, Ks, deep)
+        other, turned = self._look(network, *mirrored(images, Ks), deep)
+        means = None if logs is None or turned is None else (logs + turned.flip(-1)) / 2
+        return (seen + other.flip(2)) / 2, means
 
-    def _look(self, network: GuidedDepthNet, images: Tensor, Ks: Tensor) -> tuple[Tensor, Tensor]:
+    def _look(
+        self, network: GuidedDepthNet, images: Tensor, Ks: Tensor, deep: bool
+    ) -> tuple[Tensor, Tensor | None]:
         tokens, early = network.encoder(images)
-        tokens = with_taught(tokens, early, network.encoder.vit, self.late, self.deep)
+        tokens = with_taught(tokens, early, network.encoder.vit, self.late, self.deep if deep else None)
         taught = double(self.taught(tokens.taught_maps()), align_corners=False)
         hidden = torch.cat((network.language_head.own(tokens), taught), 1).movedim(1, -1)
-        return hidden, log_depths(self.decoder, self.depth_head, tokens, Ks)
+        return hidden, log_depths(self.decoder, self.depth_head, tokens, Ks) if deep else None
 
     @torch.no_grad()
-    def surely(self, features: Tensor, classes: Tensor) -> Tensor:
-        """Rows of classes (...) that the teacher is sure of, -1 elsewhere; remembers how sure it is.
+    def surely(self, logits: Tensor) -> Tensor:
+        """Rows of classes (...) that the teacher is sure of by its logits (..., 37), -1 elsewhere; remembers
+        how sure it is.
 
         Hard classes, of which it is usually less sure, count from less on.
         """
-        sure, said = (TEMPERATURE * features @ classes.T).float().softmax(-1).max(-1)
+        sure, said = logits.float().softmax(-1).max(-1)
         sums = torch.zeros_like(self.usual).index_add_(0, said.flatten(), sure.flatten())
         counts = torch.bincount(said.flatten(), minlength=len(self.usual)).to(sums)
         seen = counts > 0
@@ -185,21 +203,23 @@ def log_depths(decoder: nn.Module, depth_head: nn.Module, tokens: Tokens, Ks: Te
 
 
 def few_stage(bank: NameBank, weights: Weights | None = None) -> Stage:
-    """The late halves, whole, and what reads them; `averaged` is the network's while this lasts."""
+    """The late halves, whole, and what reads them; `averaged` is the network's while this lasts. Where depth
+    counts nothing its half stays as it is."""
     counts = weights or Weights()
+    learn = MODULES if counts.deep else tuple(name for name in MODULES if name not in DEPTH)
     return Stage(
-        "late_few", (*MODULES, "averaged"), (), {1: 1.0}, 6, 4e-4,
+        "late_few", (*learn, "averaged"), (), {1: 1.0}, 6, 4e-4,
         lambda network, batch, words: _loss(guided(network), batch, words, bank, counts), rates=RATES,
     )  # fmt: skip
 
 
 def _loss(network: GuidedDepthNet, batch: FewBatch, words: Words, bank: NameBank, counts: Weights) -> Loss:
     photos, generator = batch.told, words.generator
-    tokens = network.encode(photos.relit, photos.Ks)
+    tokens = encoded(network, photos.relit, counts.deep)
     hidden = read(network, thinned(tokens, HIDDEN, generator))
     total, told = told_loss(hidden, network.language_head.out, photos, bank, counts.names, generator)
     known = (photos.depths > 0).flatten(1).any(1)
-    if bool(known.any()) and counts.depth:
+    if counts.depth and bool(known.any()):
         depth = _depth(network, tokens.each(lambda hook: hook[known]), photos.Ks[known], photos.depths[known])
         total, told = total + counts.depth * depth, told | {"depth": float(depth.detach())}
     if batch.silent is not None:
@@ -217,11 +237,21 @@ def room_loss(
     """Phrases and, times `depth`, depth of a rendered room, whose tokens are found anew."""
     own = SceneBatch(
         room.images, room.depths, room.instances, room.viewmats, room.Ks,
-        network.encode(room.images, room.Ks), room.labels, room.seeds,
+        encoded(network, room.images, depth > 0), room.labels, room.seeds,
     )  # fmt: skip
-    said, seen = language_stage(network, own, words), depth_stage(network, own, words)
+    said = language_stage(network, own, words)
+    if not depth:
+        return said.total, {"phrases": float(said.total.detach())}
+    seen = depth_stage(network, own, words)
     told = {"phrases": float(said.total.detach()), "room_depth": float(seen.total.detach())}
     return said.total + depth * seen.total, told
+
+
+def encoded(network: GuidedDepthNet, images: Tensor, deep: bool) -> Tokens:
+    """Tokens of pictures (B, V, 3, H, W), as `GuidedDepthNet.encode` has them; without depth's half where
+    nothing is said of depth."""
+    tokens, early = network.encoder(images)
+    return with_taught(tokens, early, network.encoder.vit, network.late, network.deep if deep else None)
 
 
 def read(network: GuidedDepthNet, tokens: Tokens) -> Tensor:
@@ -296,7 +326,7 @@ def _silent(
     teacher, out = network.averaged, network.language_head.out
     assert isinstance(teacher, Averaged)
     teacher.follow(network)
-    seen, logs = teacher.looks(network, photos.images, photos.Ks)
+    seen, logs = teacher.looks(network, photos.images, photos.Ks, deep=counts.said_depth > 0)
     size = (seen.shape[1], seen.shape[2])
     grid = (size[0] // 4, size[1] // 4)
     boxes, other = cut_boxes(len(seen), grid, generator)
@@ -306,23 +336,26 @@ def _silent(
     drawn = torch.randperm(places.numel(), generator=generator)[:SILENT_PIXELS]
     origin = pasted(places, scaled(boxes, 4), other).flatten()[drawn]  # where the teacher saw the same
     with torch.no_grad():
-        vectors = units_at(seen, teacher.out, origin)
-    known = nearest(photos.classes, size).flatten()[origin.to(photos.classes.device)]
-    said = torch.where(known >= 0, known, teacher.surely(vectors, bank.classes.to(vectors)))
+        target = told_by(units_at(seen, teacher.out, origin), _at(photos.opinions, size, origin), bank)
+    known = _at(photos.classes, size, origin)
+    said = torch.where(known >= 0, known, teacher.surely(target.by_class))
     sure = said >= 0
-    tokens = network.encode(pictures, photos.Ks)
+    tokens = encoded(network, pictures, counts.said_depth > 0)
     hidden = read(network, thinned(tokens, HIDDEN, generator))
     units = units_at(hidden, out, drawn)
     by_class = class_loss(units[sure], said[sure], bank)
     share = float(sure.float().mean())
-    by_odds = odds_loss(units, vectors, bank)
-    total = share * by_class + ATTRACTION * _apart(units, vectors) + counts.odds * by_odds
+    by_odds = odds_loss(units, target, bank)
+    alike = target.alike
+    total = (
+        share * by_class + ATTRACTION * _apart(units[alike], target.vectors[alike]) + counts.odds * by_odds
+    )
     told = {"silent": float(by_class.detach()), "sure": share, "odds": float(by_odds.detach())}
-    if counts.said_depth:
+    if logs is not None:
         truth = without(logs.exp(), scaled(boxes, patch))
         deep = _depth(network, tokens, photos.Ks, truth)
         total, told = total + counts.said_depth * deep, told | {"said_depth": float(deep.detach())}
-    rows = nearest(photos.names, size).flatten()[origin.to(photos.names.device)].cpu()
+    rows = _at(photos.names, size, origin).cpu()
     chosen = evenly_drawn(rows, NAME_PIXELS, generator)
     if len(chosen):
         of_set = photos.sets[(origin[chosen] // (size[0] * size[1])).to(photos.sets.device)]
@@ -331,19 +364,48 @@ def _silent(
     return total, told
 
 
-def odds_loss(units: Tensor, said: Tensor, bank: NameBank) -> Tensor:
-    """How far the odds of unit vectors (P, C) lie from those that a teacher's say: among the 37 classes,
+def _at(maps: Tensor, size: tuple[int, int], places: Tensor) -> Tensor:
+    """Values (P,) of maps (B, H, W) at places of maps of `size`."""
+    return nearest(maps, size).flatten()[places.to(maps.device)]
+
+
+@dataclass(frozen=True)
+class Target:
+    """What a teacher says of pixels: unit vectors (P, C), logits of the classes (P, 37) and of all names
+    (P, N); alike (P,): its vector and its logits say the same class."""
+
+    vectors: Tensor
+    by_class: Tensor
+    by_name: Tensor
+    alike: Tensor
+
+
+def told_by(vectors: Tensor, opinions: Tensor, bank: NameBank) -> Target:
+    """What a teacher's unit vectors (P, C) say, with the evidence of what another network says (P,)."""
+    by_class, by_name = (
+        (TEMPERATURE * vectors @ texts.to(vectors).T).float() for texts in (bank.classes, bank.vectors)
+    )
+    heard = bank.heard(opinions)
+    if heard is None:
+        return Target(vectors, by_class, by_name, torch.ones_like(opinions, dtype=torch.bool))
+    own = by_class.argmax(-1)
+    by_class, by_name = by_class + heard[0], by_name + heard[1]
+    return Target(vectors, by_class, by_name, by_class.argmax(-1) == own)
+
+
+def odds_loss(units: Tensor, said: Target, bank: NameBank) -> Tensor:
+    """How far the odds of unit vectors (P, C) lie from those that a teacher says: among the 37 classes,
     where rare ones count more, and among all names."""
-    classes, names = bank.classes.to(units), bank.vectors.to(units)
-    weights = bank.balance.to(units)[(said @ classes.T).argmax(-1)]
-    by_class = (odds_apart(units, said, classes) * weights).sum() / weights.sum()
-    return by_class + odds_apart(units, said, names).mean()
+    weights = bank.balance.to(units)[said.by_class.argmax(-1)]
+    by_class = (odds_apart(units, bank.classes.to(units), said.by_class) * weights).sum() / weights.sum()
+    return by_class + odds_apart(units, bank.vectors.to(units), said.by_name).mean()
 
 
-def odds_apart(units: Tensor, said: Tensor, texts: Tensor) -> Tensor:
-    """Kullback-Leibler divergence (P,) of softmaxes over texts (N, C), in nats: what is said from what is."""
+def odds_apart(units: Tensor, texts: Tensor, logits: Tensor) -> Tensor:
+    """Kullback-Leibler divergence (P,) of softmaxes over texts (N, C), in nats: what is said from logits
+    (P, N) from what unit vectors (P, C) say."""
     ours = (TEMPERATURE * units @ texts.T).float().log_softmax(-1)
-    theirs = (TEMPERATURE * said @ texts.T).float().log_softmax(-1)
+    theirs = logits.float().log_softmax(-1)
     return (theirs.exp() * (theirs - ours)).sum(-1)
 
 

@@ -1,7 +1,7 @@
 """Going on from taught weights, with other sets of photos beside the labelled ones: `train late --more`,
 and `--twice`."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -13,8 +13,9 @@ from langflash_core.lab.training import twice
 from langflash_core.lab.training.bank import NameBank
 from langflash_core.lab.training.batches import RoomSet
 from langflash_core.lab.training.fewlabels import Averaged, FewSet, Weights, few_stage
+from langflash_core.lab.training.heard import counted, evidence
 from langflash_core.lab.training.late import make_cut, make_whole
-from langflash_core.lab.training.live import LivePhotos
+from langflash_core.lab.training.live import LivePhotos, pictures
 from langflash_core.lab.training.loop import LoopOptions, Optimising, train_stage
 from langflash_core.lab.training.pool import PhotoPool, PhotoSet
 from langflash_core.lab.training.real import MODULES, KeptPhotos, PhotoTargets
@@ -28,7 +29,8 @@ MAIN_SHARE = 0.65
 WHOLE = 0.5
 """A set of whose pixels at least this share has a name is labelled; in others the teacher has its say."""
 LEARNED = 0.5
-"""Of the way from the weights that a run begins with to those it ends with (model card)."""
+"""Of the way from the weights that a run begins with to those it ends with (model card); all of it
+where another network is heard, since nothing is lost then (MEASURED.md)."""
 EMA_DECAY, TWICE_DECAY = 0.995, 0.99
 """Of the averaged weights that a run ends with."""
 TWICE_SHARES = (0.32, 0.12, 0.56)
@@ -57,7 +59,9 @@ class Sets:
         """
         first = PhotoSet.of(main, ids, MAIN_SHARE, hold=True)
         others = [PhotoSet.of(folder, chosen_ids(folder.ids, "train"), 1.0) for folder in more]
-        bank = NameBank.of([one.named for one in (first, *others)], encode)
+        heard = counted(main, ids)
+        said = evidence(heard) if bool(heard.any()) else None
+        bank = NameBank.of([one.named for one in (first, *others)], encode, said)
         labelled = [place for place, one in enumerate(others) if labelled_share(one) >= WHOLE]
         rest = [place for place in range(len(others)) if place not in labelled]
         photos = sum(len(others[place].ids) for place in labelled)
@@ -111,13 +115,18 @@ def train_few(
     stage = few_stage(sets.told.bank, weights)
     state = train_stage(net, stage, FewSet(sets.told, sets.silent, rooms), words, run_dir, options, kept)
     del net.averaged
-    with torch.no_grad():
-        for name, value in net.state_dict().items():
-            if _learns(name) and value.is_floating_point():
-                value.lerp_(start[name].to(value), 1 - LEARNED)
-    make_cut(net)
+    if sets.told.bank.evidence is None:
+        _go_back(net, start)
+    make_cut(net, pictures(sets.told.sets[0].held))
     save_cut(run_dir / "late.pt", net, replace(stage, name="late", modules=MODULES), state)
     return state
+
+
+@torch.no_grad()
+def _go_back(network: LangFlashNet, start: Mapping[str, Tensor]) -> None:
+    for name, value in network.state_dict().items():
+        if _learns(name) and value.is_floating_point():
+            value.lerp_(start[name].to(value), 1 - LEARNED)
 
 
 def train_twice(
@@ -139,7 +148,7 @@ def train_twice(
     options = _steadily(options, TWICE_DECAY)
     stage = twice.twice_stage(sets.told.bank, copy, weights)
     state = train_stage(net, stage, FewSet(sets.together(), None, rooms), words, run_dir, options, kept)
-    make_cut(net)
+    make_cut(net, pictures(sets.told.sets[0].held))
     save_cut(run_dir / "late.pt", net, replace(stage, name="late", modules=MODULES), state)
     return state
 

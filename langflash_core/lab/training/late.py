@@ -4,6 +4,7 @@ Whole blocks learn more surely than a product of two thin matrices that starts a
 learned lies in few directions: of 384, the 52 that are kept name photos as well (model card).
 """
 
+from collections.abc import Sequence
 from typing import cast
 
 import torch
@@ -73,11 +74,38 @@ def make_whole(network: GuidedDepthNet) -> None:
         setattr(network, name, whole(getattr(network, name), network.encoder.vit))
 
 
-def make_cut(network: GuidedDepthNet) -> None:
-    """Cut both late halves of a network to the rank of its preset."""
+def make_cut(network: GuidedDepthNet, pictures: Sequence[Tensor] = ()) -> None:
+    """Cut both late halves of a network to the rank of its preset, by what these read of `pictures`
+    (1, 1, 3, H, W) in [0, 1], where there are any."""
     for name in HALVES:
         learned = getattr(network, name)
-        setattr(network, name, cut(learned, network.encoder.vit, learned.preset))
+        seen = moments(learned, network, pictures) if pictures else None
+        setattr(network, name, cut(learned, network.encoder.vit, learned.preset, seen))
+
+
+Seen = list[list[Tensor]]
+"""Of every block, second moments (n, n) float64 of what each of its four matrices reads."""
+
+
+@torch.no_grad()
+def moments(learned: WholeLateHalf, network: GuidedDepthNet, pictures: Sequence[Tensor]) -> Seen:
+    """What the matrices of whole blocks read of some pictures, summed over tokens."""
+    found: Seen = [[] for _ in learned.each()]
+    device = next(learned.parameters()).device
+    learned.eval()
+    for picture in pictures:
+        _, x = network.encoder(picture.to(device))
+        for block, sums in zip(learned.each(), found, strict=True):
+            read = block.norm1(x)
+            values = attended(block.attn.qkv(read), block.attn.heads)
+            x = x + block.ls1(block.attn.proj(values))
+            wide = block.norm2(x)
+            hidden = F.gelu(block.mlp.fc1(wide))
+            x = x + block.ls2(block.mlp.fc2(hidden))
+            own = [t.flatten(0, -2).double() for t in (read, values, wide, hidden)]
+            own = [t.T @ t for t in own]
+            sums[:] = [a + b for a, b in zip(sums, own, strict=True)] if sums else own
+    return found
 
 
 @torch.no_grad()
@@ -107,21 +135,44 @@ def soften(learned: WholeLateHalf, vit: PlainViT, share: float = KEPT) -> None:
 
 
 @torch.no_grad()
-def cut(learned: WholeLateHalf, vit: PlainViT, preset: GuidedDepth) -> LateHalf:
-    """The nearest half whose matrices differ from the encoder's by one of `preset.late_rank`.
+def cut(learned: WholeLateHalf, vit: PlainViT, preset: GuidedDepth, seen: Seen | None = None) -> LateHalf:
+    """The half whose matrices differ from the encoder's by one of `preset.late_rank`, nearest in what they
+    answer to what they read (`moments`), or nearest themselves where that is not known.
 
-    Source: Eckart and Young 1936 (singular values).
+    Nearest answers keep twice as much: of .346 of the 37 classes whole blocks have, rank 52 keeps .342
+    instead of .338 (MEASURED.md).
+
+    Source: Eckart and Young 1936 (singular values); Yuan et al. 2023 (ASVD), Wang et al. 2024 (SVD-LLM): of
+    the matrix times a root of the moments.
     """
     answer = LateHalf(preset, len(learned.hooks))
     answer.norm.load_state_dict(learned.norm.state_dict())
-    for own, (block, base) in zip(learned.each(), answer.pairs(vit), strict=True):
+    for depth, (own, (block, base)) in enumerate(zip(learned.each(), answer.pairs(vit), strict=True)):
         take_own(block, own)
-        for (correction, layer), (_, new) in zip(block.pairs(base), block.pairs(own), strict=True):
-            up, down = leading((new.weight - layer.weight).double(), preset.late_rank)
+        pairs = zip(block.pairs(base), block.pairs(own), strict=True)
+        for place, ((correction, layer), (_, new)) in enumerate(pairs):
+            change = (new.weight - layer.weight).double()
+            if seen is None:
+                up, down = leading(change, preset.late_rank)
+            else:
+                up, down = nearest_answers(change, seen[depth][place], preset.late_rank)
             correction.up.copy_(up)
             correction.down.copy_(down)
             correction.bias.copy_(new.bias)
     return answer
+
+
+def nearest_answers(change: Tensor, moments: Tensor, rank: int) -> tuple[Tensor, Tensor]:
+    """The product (m, rank) (rank, n) whose answers lie nearest to a matrix's (m, n), over inputs of second
+    moments (n, n); all float64.
+
+    With moments R R^T the mean error of the answers is the norm of (change - product) R.
+    """
+    scale = moments.diagonal().mean()
+    even = 1e-3 * torch.eye(len(moments), dtype=moments.dtype, device=moments.device)
+    root = torch.linalg.cholesky(moments / scale + even)  # what is never read counts a thousandth
+    up, down = leading(change @ root, rank)
+    return up, torch.linalg.solve_triangular(root, down, upper=False, left=False)
 
 
 def leading(change: Tensor, rank: int) -> tuple[Tensor, Tensor]:

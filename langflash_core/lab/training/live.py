@@ -18,6 +18,7 @@ from torch import Tensor
 
 from langflash_core.lab.photos import PhotoFolder
 from langflash_core.lab.photos.fitting import drawn_window, fitted
+from langflash_core.lab.photos.folder import LabelledPhoto
 from langflash_core.picture_files import opened_picture
 from langflash_core.types import LUMA
 
@@ -74,6 +75,12 @@ class LivePhotos:
             torch.stack([view.K for _, view in views])[:, None],
             tuple(self.photos[row].id for row in rows),
         )
+
+
+def pictures(photos: Sequence[LabelledPhoto], count: int = 72) -> list[Tensor]:
+    """Some of these photos as the network sees them, (1, 1, 3, H, W) in [0, 1], evenly drawn."""
+    chosen = photos[:: max(1, len(photos) // count)]
+    return [fitted(photo, SIZES[0]).rgb[None, None].float() / 255 for photo in chosen]
 
 
 def relit(rgb: Tensor, generator: torch.Generator) -> Tensor:

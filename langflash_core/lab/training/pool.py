@@ -29,7 +29,10 @@ LARGER = 17 / 14
 class DrawnPhotos:
     """images and relit (B, 1, 3, H, W) in [0, 1], own light and another; classes and names (B, H, W) rows of
     the bank, -1 = unknown; sets (B,): which set each is of; depths (B, H, W) metres, 0 = unknown; Ks
-    (B, 1, 3, 3); seeds (B): of the photos; large and large_Ks: the same windows in more pixels, or None."""
+    (B, 1, 3, 3); opinions (B, H, W) of another network, -1 = none; seeds (B): of the photos; large and
+    large_Ks: the same windows in more pixels, or None.
+
+    Drawn, they are whole numbers of one and two bytes, which processes pass on; `to` makes them these."""
 
     images: Tensor
     relit: Tensor
@@ -38,14 +41,23 @@ class DrawnPhotos:
     sets: Tensor
     depths: Tensor
     Ks: Tensor
+    opinions: Tensor
     seeds: tuple[str, ...] = ()
     large: Tensor | None = None
     large_Ks: Tensor | None = None
 
     def to(self, device: str | torch.device) -> "DrawnPhotos":
         own = {field.name: getattr(self, field.name) for field in fields(self)}
-        moved = {name: values.to(device) for name, values in own.items() if isinstance(values, Tensor)}
+        moved = {
+            name: _whole(values.to(device)) for name, values in own.items() if isinstance(values, Tensor)
+        }
         return replace(self, **moved)
+
+
+def _whole(values: Tensor) -> Tensor:
+    if values.dtype == torch.uint8:
+        return values.float() / 255
+    return values.long() if values.dtype == torch.int16 else values
 
 
 @dataclass(frozen=True)
@@ -112,7 +124,7 @@ class PhotoPool:
         views = _through(photos, windows, size)
         large = _through(photos, windows, larger(size)) if self.larger else []
         light: Callable = weathered if self.strong else relit
-        other = torch.stack([light(view.rgb, generator) for view in views])[:, None].float() / 255
+        other = torch.stack([light(view.rgb, generator) for view in views])[:, None]
         numbers = [self.numbers[s] for s in drawn]
         return DrawnPhotos(
             _pictures(views),
@@ -122,6 +134,7 @@ class PhotoPool:
             torch.tensor(numbers),
             torch.stack([view.depths for view in views]),
             _lenses(views),
+            torch.stack([view.opinions for view in views]).short(),
             tuple(f"{self.sets[s].folder.root.name}/{p.id}" for s, p in zip(drawn, photos, strict=True)),
             _pictures(large) if large else None,
             _lenses(large) if large else None,
@@ -141,7 +154,7 @@ def _through(
 
 
 def _pictures(views: Sequence[FittedPhoto]) -> Tensor:
-    return torch.stack([view.rgb for view in views])[:, None].float() / 255
+    return torch.stack([view.rgb for view in views])[:, None]
 
 
 def _lenses(views: Sequence[FittedPhoto]) -> Tensor:
@@ -150,4 +163,4 @@ def _lenses(views: Sequence[FittedPhoto]) -> Tensor:
 
 def _looked_up(views: Sequence[FittedPhoto], tables: Sequence[Tensor]) -> Tensor:
     """Rows (B, H, W) by each photo's own table."""
-    return torch.stack([table[view.labels] for view, table in zip(views, tables, strict=True)])
+    return torch.stack([table[view.labels] for view, table in zip(views, tables, strict=True)]).short()

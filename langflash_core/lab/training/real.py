@@ -23,7 +23,7 @@ from langflash_core.lab.photos.fitting import fitted
 from langflash_core.lab.photos.names import CLASSES37
 from langflash_core.lab.training.batches import RoomSet, SceneBatch
 from langflash_core.lab.training.late import HALVES, make_cut, make_whole, soften
-from langflash_core.lab.training.live import SIZES, LabelledBatch, LivePhotos
+from langflash_core.lab.training.live import SIZES, LabelledBatch, LivePhotos, pictures
 from langflash_core.lab.training.loop import LoopOptions, Validate, train_stage
 from langflash_core.lab.training.losses import depth_loss, error_loss, gradient_loss
 from langflash_core.lab.training.measures import (
@@ -321,7 +321,7 @@ def train_late(
     hand_over(teacher.cpu(), net.language_head.cpu(), targets.classes)
     for name in HALVES:
         soften(getattr(net, name), net.encoder.vit)
-    make_cut(net)
+    make_cut(net, pictures(joint.photos.photos))
     second = replace(options, minutes=options.minutes - first.minutes)
     state = train_stage(net, heads_stage(targets), joint, words, run_dir, second, validate)
     save_cut(run_dir / "late.pt", net, replace(heads_stage(targets), name="late", modules=MODULES), state)

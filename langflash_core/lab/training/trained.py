@@ -4,12 +4,14 @@ import json
 from collections.abc import Iterable
 from pathlib import Path
 
+import torch
+
 from langflash_core.errors import InputError
 from langflash_core.lab.training.late import HALVES
 from langflash_core.lab.training.real import MODULES
 from langflash_core.lab.training.recipes import Recipe, stages_of
 from langflash_core.lab.training.stages.language import language_stage
-from langflash_core.lab.training.stages.stage import Stage, modules_of
+from langflash_core.lab.training.stages.stage import Stage, guided, modules_of
 from langflash_core.lab.training.states import load_averaged
 from langflash_core.network.build import network_class
 from langflash_core.network.checkpoints.files import initial_network, read_weights, save_network, start_from
@@ -66,13 +68,20 @@ def begin(network: LangFlashNet, start: Path, done: Iterable[str]) -> list[str]:
 
 
 def run_export(
-    run_dir: Path, out: Path, start: Path | None, *, preset: str = "mini", metadata: dict | None = None
+    run_dir: Path,
+    out: Path,
+    start: Path | None,
+    *,
+    preset: str = "mini",
+    metadata: dict | None = None,
+    named: float = 1.0,
 ) -> Path:
     """Join the averaged weights of every stage in `run_dir` into one weights file; stages that
     were not trained there keep the heads of `start`, and are left out where these are imported anyway.
 
     The header says how long each stage trained, its last validation, and `metadata` (data,
-    metrics, calibration: `calibration` is what queries read).
+    metrics, calibration: `calibration` is what queries read). named: what the namer's corrections count of
+    what it learned: it knows learned photos by heart, so that less of it names others better (MEASURED.md).
 
     Raises:
         InputError: no stage has been trained.
@@ -95,6 +104,9 @@ def run_export(
     }
     if not report:
         raise InputError(f"{run_dir} {_UNTRAINED}")
+    with torch.no_grad():
+        for value in guided(network).namer.out.parameters():
+            value *= named
     details = dict(metadata or {})
     network.calibration = details.pop("calibration", {})
     save_network(network, out, {"training": report, **details})

@@ -21,6 +21,7 @@ from torch.nn import functional as F
 from langflash_core.lab.training.bank import NameBank
 from langflash_core.lab.training.fewlabels import (
     HIDDEN,
+    TEMPERATURE,
     FewBatch,
     log_depths,
     mirrored,
@@ -128,8 +129,8 @@ def said_loss(
     classes, names = bank.classes.to(units), bank.vectors.to(units)
     weights = bank.balance.to(units)[(said @ classes.T).argmax(-1)]
     apart = (1 - (units * said).sum(-1)).mean()
-    by_class = (odds_apart(units, said, classes) * weights).sum() / weights.sum()
-    by_name = odds_apart(units, said, names).mean()
+    by_class = (odds_apart(units, classes, TEMPERATURE * said @ classes.T) * weights).sum() / weights.sum()
+    by_name = odds_apart(units, names, TEMPERATURE * said @ names.T).mean()
     told = {"apart": apart, "said_classes": by_class, "said_names": by_name}
     total = counts.direction * apart + counts.classes * by_class + counts.names * by_name
     return total, {key: float(value.detach()) for key, value in told.items()}

@@ -75,11 +75,14 @@ class LateHalf(nn.Module):
 
 
 def with_taught(
-    tokens: Tokens, early: Float[Tensor, "n T C"], vit: PlainViT, late: nn.Module, deep: nn.Module
+    tokens: Tokens, early: Float[Tensor, "n T C"], vit: PlainViT, late: nn.Module, deep: nn.Module | None
 ) -> Tokens:
-    """Tokens of the encoder with those of both halves that photos taught, `late` names and `deep` depth;
-    early (B*V, 1 + h*w, C): of `vit.states`."""
-    named, far = (tuple(t.unflatten(0, tokens.shape) for t in half(early, vit)) for half in (late, deep))
+    """Tokens of the encoder with those of both halves that photos taught, `late` names and `deep` depth
+    (None: nobody asks for depth); early (B*V, 1 + h*w, C): of `vit.states`."""
+    named, far = (
+        () if half is None else tuple(t.unflatten(0, tokens.shape) for t in half(early, vit))
+        for half in (late, deep)
+    )
     return replace(tokens, named=named, deep=far)
 
 

@@ -141,7 +141,7 @@ def test_a_class_counts_from_its_own_usual_sureness(network):
 
     # Row 3 needs .9, row 5 .9 / 3 = .3, others .9 * 2 / 3 = .6.
     features = torch.stack([seen(3, 0.92), seen(3, 0.88), seen(5, 0.35), seen(5, 0.25), seen(7, 0.58)])
-    assert teacher.surely(features, texts).tolist() == [3, -1, 5, -1, -1]
+    assert teacher.surely(TEMPERATURE * features @ texts.T).tolist() == [3, -1, 5, -1, -1]
     assert float(teacher.usual[3]) == pytest.approx(0.98 * 0.9 + 0.02 * 0.9, rel=1e-3)
     assert float(teacher.usual[7]) == pytest.approx(0.98 * 0.4 + 0.02 * 0.58, rel=1e-3)
     assert float(teacher.usual[9]) == pytest.approx(0.4), "nothing was said of it"
@@ -164,7 +164,8 @@ def test_the_teacher_says_the_same_of_a_mirrored_photo_mirrored(network):
     Ks = torch.tensor([[70.0, 0, 40], [0, 70, 28], [0, 0, 1]]).expand(2, 1, 3, 3)
     hidden, logs = teacher.looks(network, images, Ks)
     other, deeper = teacher.looks(network, *fewlabels.mirrored(images, Ks))
-    one, _ = teacher._look(network, images, Ks)
+    one, _ = teacher._look(network, images, Ks, deep=False)
+    assert logs is not None and deeper is not None
     assert torch.allclose(hidden, other.flip(2), atol=1e-4) and torch.allclose(
         logs, deeper.flip(-1), atol=1e-4
     )
@@ -240,7 +241,8 @@ def test_names_teach_one_half_and_depth_the_other(sets, network):
     made = deepcopy(network)
     make_whole(made)
     torch.nn.init.normal_(made.decoder.embed_named.weight, std=0.02)  # it begins at 0
-    photos, generator = sets.told.draw(2, torch.Generator().manual_seed(0)), torch.Generator().manual_seed(0)
+    generator = torch.Generator().manual_seed(0)
+    photos = sets.told.draw(2, torch.Generator().manual_seed(0)).to("cpu")
     tokens = made.encode(photos.relit, photos.Ks)
     hidden, out = fewlabels.read(made, tokens), made.language_head.out
     names, _ = fewlabels.told_loss(hidden, out, photos, sets.told.bank, 0.5, generator)
@@ -264,7 +266,7 @@ def test_photos_without_labels_teach_by_the_teacher_alone(sets, network, monkeyp
     made.requires_grad_(False)
     made.late.requires_grad_(True)
     plain = fewlabels.PhotoPool(sets.silent.sets[1:], (2,), sets.silent.bank, strong=True)
-    batch = plain.draw(2, torch.Generator().manual_seed(0))
+    batch = plain.draw(2, torch.Generator().manual_seed(0)).to("cpu")
     counts = fewlabels.Weights(odds=0, said_depth=0)
     monkeypatch.setattr(fewlabels, "ATTRACTION", 0.0)
     total, told = fewlabels._silent(made, batch, sets.told.bank, counts, torch.Generator().manual_seed(0))

@@ -48,7 +48,7 @@ def _view(labels: torch.Tensor) -> FittedPhoto:
     """A wall at 4 m with chairs at 2 m, seen with a focal length of 20."""
     depths = torch.where(labels == 1, 2.0, 4.0)
     K = torch.tensor([[20.0, 0, 16], [0, 20.0, 16], [0, 0, 1]])
-    return FittedPhoto(torch.zeros(3, 32, 32, dtype=torch.uint8), labels, depths, K)
+    return FittedPhoto(torch.zeros(3, 32, 32, dtype=torch.uint8), labels, depths, K, torch.full((32, 32), -1))
 
 
 def test_two_chairs_keep_their_numbers_when_the_camera_steps_aside():

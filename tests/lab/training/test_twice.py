@@ -45,7 +45,7 @@ def test_all_sets_teach_together_with_their_larger_pictures(sets):
     assert [one.folder.root.name for one in pool.sets] == ["main", "outlines", "plain"]
     assert pool.sets[0].share == TWICE_SHARES[0]
     assert sum(one.share for one in pool.sets[1:]) == pytest.approx(TWICE_SHARES[2])
-    drawn = pool.draw(4, torch.Generator().manual_seed(2))
+    drawn = pool.draw(4, torch.Generator().manual_seed(2)).to("cpu")
     height, width = drawn.images.shape[-2:]
     assert drawn.large.shape[-2:] == larger((width, height))[::-1]
     small = F.interpolate(drawn.large[:, 0], size=(height, width), mode="area")
@@ -61,7 +61,7 @@ def test_larger_pictures_are_whole_patches():
 
 def test_a_copy_says_the_mean_of_what_it_sees_mirrored_and_larger(sets, network):
     """Against the network itself, look by look."""
-    photos = sets.together().draw(2, torch.Generator().manual_seed(1))
+    photos = sets.together().draw(2, torch.Generator().manual_seed(1)).to("cpu")
     said, logs = Copy(network).says(photos)
     with torch.no_grad():
         images, Ks = photos.images.flip(-1), photos.Ks.clone()
@@ -102,7 +102,7 @@ def test_mirrored_twice_is_as_before():
 def test_odds_apart_are_those_of_a_plain_loop():
     generator = torch.Generator().manual_seed(0)
     units, said, texts = (F.normalize(torch.randn(n, 384, generator=generator), dim=1) for n in (5, 5, 7))
-    found = odds_apart(units, said, texts)
+    found = odds_apart(units, texts, TEMPERATURE * said @ texts.T)
     for ours, theirs, value in zip(units.double(), said.double(), found.tolist(), strict=True):
         p = [math.exp(TEMPERATURE * float(theirs @ text)) for text in texts.double()]
         q = [math.exp(TEMPERATURE * float(ours @ text)) for text in texts.double()]
