@@ -190,7 +190,11 @@ def test_parts_of_many_photos_are_weights_and_about_those_of_few(network, images
     assert own.dtype == torch.float16 and len(own) == VIEWS
     assert torch.allclose(own.float().sum(1), torch.ones(VIEWS, SIDE, SIDE), atol=5e-3)
     assert own.shape == whole.shape
-    assert (own.argmax(1) == whole.argmax(1)).float().mean() > 0.95  # half precision moves borders
+    count = own.shape[1]
+    pairs = torch.bincount((own.argmax(1) * count + whole.argmax(1)).flatten(), minlength=count**2)
+    both = pairs.view(count, count).float()  # two parts about as large may change numbers
+    for side in (0, 1):
+        assert both.amax(side).sum() / both.sum() > 0.99  # half precision moves borders
 
 
 def test_means_over_many_photos_are_those_over_all_at_once():
