@@ -56,8 +56,8 @@ def fitted(
     empty = np.zeros((height, width), dtype=np.float32)
     labels = seen_through(empty.astype(np.int64) if photo.labels is None else photo.labels, box, size)
     depths = seen_through(empty if photo.depths is None or not photo.metric else photo.depths, box, size)
-    silent = empty.astype(np.int64) - 1
-    opinions = seen_through(silent if photo.opinions is None else photo.opinions, box, size)
+    silent = torch.full((size[1], size[0]), -1)
+    opinions = silent if photo.opinions is None else seen_through(photo.opinions, box, size)
     if mirrored:
         rgb, labels, depths, opinions = (map.flip(-1) for map in (rgb, labels, depths, opinions))
         K = K.clone()

@@ -59,7 +59,7 @@ class Sets:
         """
         first = PhotoSet.of(main, ids, MAIN_SHARE, hold=True)
         others = [PhotoSet.of(folder, chosen_ids(folder.ids, "train"), 1.0) for folder in more]
-        heard = counted(main, ids)
+        heard = counted(main.names, first.held)
         said = evidence(heard) if bool(heard.any()) else None
         bank = NameBank.of([one.named for one in (first, *others)], encode, said)
         labelled = [place for place, one in enumerate(others) if labelled_share(one) >= WHOLE]

@@ -8,13 +8,14 @@ On the kept photos of NYU Depth v2 the shipped features name .300 of the 37 clas
 evidence of a DeepLab of 2.3 MB, which alone names half as well (MEASURED.md).
 """
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Mapping
 
 import numpy as np
 import torch
 from torch import Tensor
 
-from langflash_core.lab.photos import PhotoFolder
+from langflash_core.lab.photos import Name
+from langflash_core.lab.photos.folder import LabelledPhoto
 from langflash_core.lab.photos.names import CLASSES37
 
 OTHER = len(CLASSES37)
@@ -26,26 +27,20 @@ WEIGHT = 0.75
 """Of the evidence: neighbouring pixels and both networks err together. (.5 to 1 name as well, 1.5 worse.)"""
 
 
-def counted(folder: PhotoFolder, ids: Sequence[str]) -> Tensor:
+def counted(names: Mapping[int, Name], photos: Iterable[LabelledPhoto]) -> Tensor:
     """How often each value is said of each class, (38, 256) float64, over labelled pixels of photos that have
-    opinions.
-
-    Raises:
-        InputError: labels or opinions cannot be read.
-    """
-    row_of = np.full(max(folder.names, default=0) + 1, OTHER)
+    opinions."""
+    row_of = np.full(max(names, default=0) + 1, OTHER)
     row_of[0] = -1
-    for id, name in folder.names.items():
+    for id, name in names.items():
         if name.label in CLASSES37:
             row_of[id] = CLASSES37.index(name.label)
     counts = np.zeros((OTHER + 1) * VALUES)
-    for id in ids:
-        labels = folder.labels(id)
-        said = folder.opinions(id, (labels.shape[0], labels.shape[1]))
-        if said is not None:
-            rows = row_of[labels]
+    for photo in photos:
+        if photo.labels is not None and photo.opinions is not None:
+            rows = row_of[photo.labels]
             known = rows >= 0
-            counts += np.bincount(VALUES * rows[known] + said[known], minlength=len(counts))
+            counts += np.bincount(VALUES * rows[known] + photo.opinions[known], minlength=len(counts))
     return torch.from_numpy(counts.reshape(OTHER + 1, VALUES))
 
 

@@ -80,8 +80,9 @@ def run_export(
     were not trained there keep the heads of `start`, and are left out where these are imported anyway.
 
     The header says how long each stage trained, its last validation, and `metadata` (data,
-    metrics, calibration: `calibration` is what queries read). named: what the namer's corrections count of
-    what it learned: it knows learned photos by heart, so that less of it names others better (MEASURED.md).
+    metrics, calibration: `calibration` is what queries read). named: what corrections of a namer that
+    learned in `run_dir` count of what it learned: it knows learned photos by heart, so that less of it names
+    others better (MEASURED.md).
 
     Raises:
         InputError: no stage has been trained.
@@ -104,9 +105,10 @@ def run_export(
     }
     if not report:
         raise InputError(f"{run_dir} {_UNTRAINED}")
-    with torch.no_grad():
-        for value in guided(network).namer.out.parameters():
-            value *= named
+    if trained["naming"] is not None:
+        with torch.no_grad():
+            for value in guided(network).namer.out.parameters():
+                value *= named
     details = dict(metadata or {})
     network.calibration = details.pop("calibration", {})
     save_network(network, out, {"training": report, **details})
