@@ -19,6 +19,7 @@ from langflash_core.geometry.cameras import rays
 from langflash_core.geometry.vantage import leading
 from langflash_core.keeping import MATCHES
 from langflash_core.memory import give_back
+from langflash_core.network.encoders.deeplab import DeepLab
 from langflash_core.network.encoders.late import LateHalf, with_taught
 from langflash_core.network.encoders.local import LocalFeatures
 from langflash_core.network.encoders.shared import Encoder, Tokens, tokens_to_maps
@@ -37,6 +38,7 @@ from langflash_core.network.semantics.grouping import (
     surviving_of,
 )
 from langflash_core.network.semantics.naming import PartNamer, describe, places
+from langflash_core.network.semantics.second import SecondHead, both, looked_at
 from langflash_core.network.semantics.splitting import condensed, joint_maps, split_groups, split_maps
 from langflash_core.network.stereo.adjustment import Sought
 from langflash_core.network.stereo.agreement import agreed, met
@@ -67,10 +69,11 @@ class GuidedDepthNet(LangFlashNet):
     Trained stage by stage: `depth` = decoder + depth_head, `refine` = refiner, `gaussians` =
     gaussian_head, `language` = language_head, `grouping` = siamese + scratch + grouping,
     `aggregation` = aggregation, `naming` = namer; `late` and `deep`, the halves that real photos taught names
-    and depth, learn before (`train late`). The encoder and the local features stay frozen.
+    and depth, learn before (`train late`); `second_head` reads DeepLab's maps (`train second`). The encoder,
+    the local features and DeepLab stay frozen.
     """
 
-    frozen = ("encoder", "local")
+    frozen = ("encoder", "local", "deeplab")
     compact = True
     bfloat16_on_cpu = False  # a seventh of a second quicker, and a part in forty merges otherwise
     surfaces = True
@@ -95,6 +98,8 @@ class GuidedDepthNet(LangFlashNet):
         self.grouping = SemanticGrouping(preset)
         self.aggregation = Aggregation(preset)
         self.namer = PartNamer(preset)
+        self.deeplab = DeepLab()
+        self.second_head = SecondHead(preset)
 
     def begin_halves(self) -> None:
         """Let the late halves give the encoder's own tokens, until something is learned."""
@@ -245,11 +250,14 @@ class GuidedDepthNet(LangFlashNet):
     def named(
         self, atoms: Float[Tensor, "K C"], weights: Float[Tensor, "V K H W"], seen: Seen
     ) -> Float[Tensor, "K C"]:
-        """Atoms corrected by deep tokens, places and each other."""
+        """Atoms corrected by deep tokens, places and each other, and by what a second network says."""
         if len(atoms) == 0:
             return atoms
         where = places(weights, seen.depths, seen.viewmats, seen.Ks)
-        return self.namer(atoms, describe(weights, seen.tokens), where)
+        named = self.namer(atoms, describe(weights, seen.tokens), where)
+        if self.second_head.silent:
+            return named
+        return both(named, looked_at(self.deeplab, self.second_head, seen.images, weights))
 
     def reconstruct(
         self,

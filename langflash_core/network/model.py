@@ -41,9 +41,10 @@ class Geometry:
 
 @dataclass(frozen=True)
 class Seen:
-    """What tells a part's name besides language features: tokens of the scene (B = 1), depths (V, H, W),
-    viewmats (V, 4, 4) and Ks (V, 3, 3) of all its views."""
+    """What tells a part's name besides language features: images (V, 3, H, W) in [0, 1], tokens of the scene
+    (B = 1), depths (V, H, W), viewmats (V, 4, 4) and Ks (V, 3, 3) of all its views."""
 
+    images: Float[Tensor, "V 3 H W"]
     tokens: Tokens
     depths: Float[Tensor, "V H W"]
     viewmats: Float[Tensor, "V 4 4"]
@@ -272,10 +273,12 @@ class LangFlashNet(nn.Module):
                 weights = [redrawn(own, views) for own, views in zip(weights, scenes, strict=True)]
         with run.stage("aggregation"):
             dictionaries = [
-                self.dictionary(w, f[None], Seen(own, found.depths, found.viewmats, views.Ks.to(device)))
+                self.dictionary(
+                    w, f[None], Seen(x[0], own, found.depths, found.viewmats, views.Ks.to(device))
+                )
                 if atoms is None
                 else atoms(w, f[None])
-                for w, f, found, views, (_, _, own) in zip(
+                for w, f, found, views, (x, _, own) in zip(
                     weights, features, geometries, scenes, each, strict=True
                 )
             ]

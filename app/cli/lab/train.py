@@ -11,10 +11,11 @@ from typing import Any, TextIO
 from langflash_core.errors import InputError, WeightsError
 from langflash_core.extras import optional_packages
 from langflash_core.files import check_folder, check_output_file, readable_file
+from langflash_core.lab.labels.lite import read_deeplab
 from langflash_core.lab.labels.opinions import LiteNetwork, write_opinions
 from langflash_core.lab.labels.outlines import write_outlines
 from langflash_core.lab.labels.prompted import PromptedSam
-from langflash_core.lab.photos import chosen_ids, open_folder
+from langflash_core.lab.photos import PhotoFolder, chosen_ids, open_folder
 from langflash_core.lab.photos.layouts import convert
 from langflash_core.lab.photos.reading import Source
 from langflash_core.lab.photos.writing import FolderWriter
@@ -24,6 +25,7 @@ from langflash_core.lab.training.commands import (
     run_find_parts,
     run_late,
     run_recipe,
+    run_second,
 )
 from langflash_core.lab.training.loop import LoopOptions
 from langflash_core.lab.training.photos import run_photo_cache
@@ -53,6 +55,7 @@ def run(args: Namespace, out: TextIO) -> None:
         "photos": _convert,
         "parts": _parts,
         "late": _late,
+        "second": _second,
         "outlines": _outlines,
         "opinions": _opinions,
         "run": _run,
@@ -144,12 +147,7 @@ def _parts(args: Namespace, out: TextIO) -> None:
 
 
 def _late(args: Namespace, out: TextIO) -> None:
-    if not args.cache.is_dir():
-        raise InputError(f"there is no folder {args.cache}; make it with langflash train cache")
-    check_folder(args.output)
-    folder = opened_folder(args)
-    if not folder.labelled:
-        raise InputError(f"{args.folder} has no names.csv, so its photos name nothing; give labelled ones")
+    folder = _labelled(args)
     if args.twice and not args.more:
         raise InputError(
             "--twice teaches with other sets of photos beside the labelled ones; name some with --more"
@@ -158,31 +156,60 @@ def _late(args: Namespace, out: TextIO) -> None:
         raise InputError(
             "--names goes with --more and without --twice; name other sets of photos with --more"
         )
-    more = [open_folder(place) for place in args.more]
-    learned = chosen_ids(folder.ids, "train")
-    kept = [id for id in folder.ids if id not in learned]
     with joined(args.device) as device:
         state = run_late(
-            args.cache,
-            folder,
-            learned,
-            kept[::2],  # the other half is for the threshold
-            args.output,
-            _start(args),
-            language_space(PRESETS[args.preset].space).encode,
-            replace(
-                _options(args, args.minutes),
-                device=device,
-                **_faster(args),
-                validate_s=min(300.0, 12 * args.minutes),
-            ),
-            more=more,
+            *_learned_from(args, folder, device),
             twice=args.twice,
             names=args.names,
-            preset=args.preset,
+            **_besides(args),
         )
         if leads():
             print(f"{args.output}: trained the late halves, {state.step} steps", file=out)
+
+
+def _second(args: Namespace, out: TextIO) -> None:
+    folder, weights = _labelled(args), None
+    if args.weights is not None:
+        readable_file(args.weights, "TensorFlow Lite network", WeightsError)
+        with optional_packages():
+            weights = read_deeplab(args.weights)
+    with joined(args.device) as device:
+        state = run_second(*_learned_from(args, folder, device), weights=weights, **_besides(args))
+        if leads():
+            print(f"{args.output}: trained what reads the second network, {state.step} steps", file=out)
+
+
+def _labelled(args: Namespace) -> PhotoFolder:
+    if not args.cache.is_dir():
+        raise InputError(f"there is no folder {args.cache}; make it with langflash train cache")
+    check_folder(args.output)
+    folder = opened_folder(args)
+    if not folder.labelled:
+        raise InputError(f"{args.folder} has no names.csv, so its photos name nothing; give labelled ones")
+    return folder
+
+
+def _learned_from(args: Namespace, folder: PhotoFolder, device: str) -> tuple[Any, ...]:
+    """What both `late` and `second` are given first."""
+    learned = chosen_ids(folder.ids, "train")
+    kept = [id for id in folder.ids if id not in learned]
+    options = replace(
+        _options(args, args.minutes), device=device, **_faster(args), validate_s=min(300.0, 12 * args.minutes)
+    )
+    return (
+        args.cache,
+        folder,
+        learned,
+        kept[::2],  # the other half is for the threshold
+        args.output,
+        _start(args),
+        language_space(PRESETS[args.preset].space).encode,
+        options,
+    )
+
+
+def _besides(args: Namespace) -> dict[str, Any]:
+    return {"more": [open_folder(place) for place in args.more], "preset": args.preset}
 
 
 def _options(args: Namespace, minutes: float) -> LoopOptions:

@@ -138,6 +138,7 @@ def add_train(commands) -> None:
     )
     _add_start(parts)
     _add_late(actions)
+    _add_second(actions)
     _add_stages(actions)
     export = new_command(actions, "export", "all stages of a run to one checkpoint")
     export.add_argument("run", type=Path, metavar="RUN")
@@ -280,16 +281,7 @@ def _add_late(actions) -> None:
     late = new_command(
         actions, "late", "train the late halves of the encoder, names and depth, on labelled photos and rooms"
     )
-    late.add_argument("cache", type=Path, metavar="CACHE", help="rooms, made by train cache")
-    late.add_argument(
-        "--photos",
-        type=Path,
-        dest="folder",
-        metavar="FOLDER",
-        required=True,
-        help="labelled photos, as train photos makes them; every seventh run of numbers is kept to validate",
-    )
-    add_description(late)
+    _add_labelled(late)
     late.add_argument(
         "--more",
         type=Path,
@@ -309,10 +301,44 @@ def _add_late(actions) -> None:
         action="store_true",
         help="with --more: what the weights say of every photo mirrored and larger teaches them instead",
     )
-    add_output(late, "RUN", "folder of checkpoints and logs")
-    late.add_argument("--minutes", required=True, type=minutes, metavar="M", help="of training")
-    _add_loop(late)
-    _add_start(late)
+    _add_budget(late)
+
+
+def _add_second(actions) -> None:
+    second = new_command(
+        actions, "second", "train what reads another network's maps, on labelled photos and rooms"
+    )
+    _add_labelled(second)
+    second.add_argument(
+        "--more", type=Path, nargs="+", default=[], metavar="FOLDER", help="other photos that name something"
+    )
+    second.add_argument(
+        "--weights",
+        type=Path,
+        metavar="FILE",
+        help="DeepLab of 32 names on MobileNetV2, .tflite (default: the one in the weights file)",
+    )
+    _add_budget(second)
+
+
+def _add_labelled(command: argparse.ArgumentParser) -> None:
+    command.add_argument("cache", type=Path, metavar="CACHE", help="rooms, made by train cache")
+    command.add_argument(
+        "--photos",
+        type=Path,
+        dest="folder",
+        metavar="FOLDER",
+        required=True,
+        help="labelled photos, as train photos makes them; every seventh run of numbers is kept to validate",
+    )
+    add_description(command)
+
+
+def _add_budget(command: argparse.ArgumentParser) -> None:
+    add_output(command, "RUN", "folder of checkpoints and logs")
+    command.add_argument("--minutes", required=True, type=minutes, metavar="M", help="of training")
+    _add_loop(command)
+    _add_start(command)
 
 
 def _add_loop(command: argparse.ArgumentParser) -> None:

@@ -159,7 +159,7 @@ def _share(network: LangFlashNet, side: int, num_views: int) -> _Shared:
             (gaussians.means, gaussians.scales, gaussians.opacities[:, None]), 1
         ).float(),
     }
-    return _Shared(done, groups, features, Seen(tokens, geometry.depths, geometry.viewmats, Ks[0]))
+    return _Shared(done, groups, features, Seen(images[0], tokens, geometry.depths, geometry.viewmats, Ks[0]))
 
 
 @torch.inference_mode()

@@ -12,7 +12,6 @@ Sizes: H W pixels of a photo, h w scores, N names.
 
 import io
 import logging
-import warnings
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Protocol, runtime_checkable
@@ -23,6 +22,7 @@ from PIL import Image
 
 from langflash_core.errors import InputError
 from langflash_core.files import make_folder, write_atomically
+from langflash_core.lab.labels.lite import opened_lite
 from langflash_core.lab.photos import PhotoFolder
 
 log = logging.getLogger(__name__)
@@ -50,17 +50,7 @@ class LiteNetwork:
         """Raises:
         InputError: the file is no such network.
         """
-        from ai_edge_litert.interpreter import Interpreter
-
-        try:
-            with warnings.catch_warnings():  # it asks whether one means to read what lies inside
-                warnings.simplefilter("ignore", UserWarning)
-                self._net = Interpreter(
-                    str(path), num_threads=threads, experimental_preserve_all_tensors=True
-                )
-            self._net.allocate_tensors()
-        except (ValueError, RuntimeError) as error:
-            raise InputError(f"{path} is no TensorFlow Lite network ({error}); give a .tflite file") from None
+        self._net = opened_lite(path, threads)
         self._input = self._net.get_input_details()[0]
         self._side = int(self._input["shape"][1])
         self._output = self._scores_of(path)

@@ -6,7 +6,7 @@ training does not import the query stage.
 
 import logging
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -28,13 +28,14 @@ from langflash_core.lab.training.cache import (
 from langflash_core.lab.training.dense import DenseSet
 from langflash_core.lab.training.fewlabels import NAMES_ALONE
 from langflash_core.lab.training.frozen import FrozenSet
-from langflash_core.lab.training.further import Sets, judge_of, train_few, train_twice
+from langflash_core.lab.training.further import Sets, judge_of, train_few, train_second, train_twice
 from langflash_core.lab.training.live import LivePhotos
 from langflash_core.lab.training.loop import LoopOptions, Validate, train_stage
 from langflash_core.lab.training.mixing import MixedSet
 from langflash_core.lab.training.naming import NAMING
 from langflash_core.lab.training.outlined import outlined_set
 from langflash_core.lab.training.parts import PartSet, run_parts
+from langflash_core.lab.training.pool import PhotoPool, PhotoSet
 from langflash_core.lab.training.real import JointSet, KeptPhotos, PhotoTargets, train_late
 from langflash_core.lab.training.recipes import Recipe, stages_of
 from langflash_core.lab.training.scenes import SceneSet, SceneSource
@@ -233,6 +234,44 @@ def run_late(
     targets = PhotoTargets.of(photos, live, encode)
     check = KeptPhotos(LivePhotos(photos, kept), targets, options.device) if kept else None
     return train_late(network, targets, JointSet(live, rooms), words, run_dir, options, check)
+
+
+def run_second(
+    folder: Path,
+    photos: PhotoFolder,
+    ids: Sequence[str],
+    kept: Sequence[str],
+    run_dir: Path,
+    start: Path,
+    encode: Encode,
+    options: LoopOptions,
+    *,
+    more: Sequence[PhotoFolder] = (),
+    weights: Mapping[str, Tensor] | None = None,
+    preset: str = "mini",
+) -> LoopState:
+    """Train what reads the second network's maps, on labelled photos and the cached rooms.
+
+    Args:
+        ids: of the photos to learn from. kept: of those to judge by now and then. start: weights file.
+            more: other sets that name something. weights: of the second network (`DeepLab`); None: those of
+            `start`.
+
+    Raises:
+        InputError: no cache, no second network, or a photo cannot be used.
+    """
+    rooms = _open(folder / "train")
+    rooms.tokens = False
+    network = guided(initial_network(PRESETS[preset], start, options.seed))
+    begin(network, start, ())
+    if weights is not None:
+        network.deeplab.load_state_dict(weights)
+    if not bool(network.deeplab.stem.weight.any()):
+        raise InputError(f"{start} holds no second network; give one with --weights")
+    learned = Sets.of(photos, ids, more, encode).named()
+    judged = PhotoPool((PhotoSet.of(photos, kept, 1.0),), (0,), learned.bank) if kept else None
+    table = phrase_table(folder, encode)
+    return train_second(network, learned, judged, rooms, table, run_dir, options)
 
 
 def _open(folder: Path, limit: int | None = None, *, photos: bool = False) -> RoomSet:

@@ -1,5 +1,5 @@
 """Going on from taught weights, with other sets of photos beside the labelled ones: `train late --more`,
-and `--twice`."""
+`--twice`, and `train second`."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -17,8 +17,9 @@ from langflash_core.lab.training.heard import counted, evidence
 from langflash_core.lab.training.late import make_cut, make_whole
 from langflash_core.lab.training.live import LivePhotos, pictures
 from langflash_core.lab.training.loop import LoopOptions, Optimising, train_stage
-from langflash_core.lab.training.pool import PhotoPool, PhotoSet
+from langflash_core.lab.training.pool import WHOLE, PhotoPool, PhotoSet, labelled_share
 from langflash_core.lab.training.real import MODULES, KeptPhotos, PhotoTargets
+from langflash_core.lab.training.second import KeptPixels, PixelSet, RoomPixels, second_stage
 from langflash_core.lab.training.stages.stage import Words, guided
 from langflash_core.lab.training.states import LoopState, save_cut
 from langflash_core.lab.training.words import PhraseSampler, PhraseTable
@@ -26,8 +27,6 @@ from langflash_core.network.model import LangFlashNet
 
 MAIN_SHARE = 0.65
 """Of the labelled photos of a step, those of the judged set; other labelled sets share the rest."""
-WHOLE = 0.5
-"""A set of whose pixels at least this share has a name is labelled; in others the teacher has its say."""
 LEARNED = 0.5
 """Of the way from the weights that a run begins with to those it ends with (model card); all of it
 where another network is heard, since nothing is lost then (MEASURED.md)."""
@@ -73,6 +72,14 @@ class Sets:
             PhotoPool(tuple(silent), tuple(place + 1 for place in rest), bank, strong=True) if rest else None,
         )
 
+    def named(self) -> PhotoPool:
+        """Those that name anything."""
+        silent = self.silent or PhotoPool((), (), self.told.bank)
+        pairs = zip((*self.told.sets, *silent.sets), self.told.numbers + silent.numbers, strict=True)
+        named = [(one, number) for one, number in pairs if one.folder.labelled]
+        sets, numbers = zip(*named, strict=True)
+        return PhotoPool(sets, numbers, self.told.bank)
+
     def together(self) -> PhotoPool:
         """All of them as one, with their larger pictures."""
         first, *told = self.told.sets
@@ -83,12 +90,6 @@ class Sets:
             whole = sum(one.share for one in sets)
             shared += [replace(one, share=share * one.share / whole) for one in sets]
         return PhotoPool(tuple(shared), numbers, self.told.bank, larger=True)
-
-
-def labelled_share(photos: PhotoSet) -> float:
-    """Share of the pixels of a set that have a name."""
-    shown = photos.named.shown
-    return sum(sum(one.pixels.values()) / one.size for one in shown) / max(len(shown), 1)
 
 
 def train_few(
@@ -120,6 +121,28 @@ def train_few(
     make_cut(net, pictures(sets.told.sets[0].held))
     save_cut(run_dir / "late.pt", net, replace(stage, name="late", modules=MODULES), state)
     return state
+
+
+def train_second(
+    network: LangFlashNet,
+    photos: PhotoPool,
+    kept: PhotoPool | None,
+    rooms: RoomSet | None,
+    table: PhraseTable,
+    run_dir: Path,
+    options: LoopOptions,
+) -> LoopState:
+    """Train what reads the second network's maps, from nothing, judged by `kept`: `RUN/second.pt`."""
+    net = guided(network)
+    with torch.random.fork_rng(devices=()):
+        torch.manual_seed(options.seed)
+        net.second_head.reset_parameters()
+    words = Words(PhraseSampler(table), torch.Generator().manual_seed(options.seed))
+    net.deeplab.to(options.device)
+    seen = None if rooms is None else RoomPixels.of(net.deeplab, rooms, words)
+    pixels = PixelSet.of(net.deeplab, photos, words.generator, seen)
+    judge = None if kept is None else KeptPixels(PixelSet.of(net.deeplab, kept, words.generator), photos.bank)
+    return train_stage(net, second_stage(photos.bank), pixels, words, run_dir, options, judge)
 
 
 @torch.no_grad()

@@ -21,6 +21,8 @@ from langflash_core.lab.training.live import SIZES, relit, weathered
 
 RARER = 0.5
 """A photo is drawn by (how many photos show its rarest name)^-RARER."""
+WHOLE = 0.5
+"""A set of whose pixels at least this share has a name is labelled; others are in part, or not at all."""
 LARGER = 17 / 14
 """Sides of a larger picture, in whole patches, in shares of the drawn one's."""
 
@@ -95,6 +97,12 @@ def _chances(shown: Sequence[Shown], count: int) -> Tensor:
     photos_of = Counter(id for photo in shown for id in photo.seen)
     rarest = [min((photos_of[id] for id in photo.seen), default=len(shown)) for photo in shown]
     return torch.tensor(rarest, dtype=torch.float32) ** -RARER
+
+
+def labelled_share(photos: PhotoSet) -> float:
+    """Share of the pixels of a set that have a name."""
+    shown = photos.named.shown
+    return sum(sum(one.pixels.values()) / one.size for one in shown) / max(len(shown), 1)
 
 
 @dataclass(frozen=True)

@@ -7,6 +7,7 @@ from pathlib import Path
 import torch
 
 from langflash_core.errors import InputError
+from langflash_core.lab.training import second
 from langflash_core.lab.training.late import HALVES
 from langflash_core.lab.training.real import MODULES
 from langflash_core.lab.training.recipes import Recipe, stages_of
@@ -23,6 +24,12 @@ from langflash_core.network.presets import PRESETS
 LATE = Stage("late", MODULES, (), {1: 1.0}, 6, 6e-4, language_stage)
 """What `train late` leaves in a run for the stages after it; `real` says how it learns."""
 ALL_STAGES = stages_of("mini")
+_MODULES = {
+    LATE.name: LATE.modules,
+    second.NAME: second.MODULES,
+    **{name: stage.modules for name, stage in ALL_STAGES.items()},
+}
+"""Of whatever a run can have trained."""
 
 _UNTRAINED = "holds no trained stage; run `langflash train run` first"
 
@@ -47,7 +54,7 @@ def prepared(
 def load_trained(network: LangFlashNet, run_dir: Path) -> dict[str, int]:
     """Steps of every stage in a run, whose weights the network then has; the late halves, and what
     learned with them, before those that went on."""
-    names = (LATE.name, *stages_of(network.preset.name))
+    names = (LATE.name, second.NAME, *stages_of(network.preset.name))
     found = {name: load_averaged(network, run_dir, name) for name in names}
     return {name: counts[0] for name, counts in found.items() if counts is not None}
 
@@ -55,10 +62,11 @@ def load_trained(network: LangFlashNet, run_dir: Path) -> dict[str, int]:
 def begin(network: LangFlashNet, start: Path, done: Iterable[str]) -> list[str]:
     """The stages whose modules are trained in a run or could be filled from `start`, but for `done`."""
     done = set(done)
-    filled = {module for name in done for module in (LATE if name == LATE.name else ALL_STAGES[name]).modules}
+    filled = {module for name in done for module in _MODULES[name]}
     tensors, _ = read_weights(start)
-    if LATE.name not in done:
-        start_from(network, tensors, HALVES)
+    for name, modules in ((LATE.name, HALVES), (second.NAME, second.MODULES)):
+        if name not in done:
+            start_from(network, tensors, modules)
     names = [name for name in ALL_STAGES if name not in done]
     return [
         name
@@ -92,7 +100,7 @@ def run_export(
     if start is None:
         raise InputError(f"exporting '{preset}' needs the weights file it began with; give it with --start")
     network = initial_network(PRESETS[preset], start)
-    trained = {name: load_averaged(network, run_dir, name) for name in (LATE.name, *ALL_STAGES)}
+    trained = {name: load_averaged(network, run_dir, name) for name in _MODULES}
     begin(network, start, [name for name, counts in trained.items() if counts is not None])
     report = {
         name: {

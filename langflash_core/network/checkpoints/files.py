@@ -20,10 +20,12 @@ from langflash_core.network.build import build_network, network_class
 from langflash_core.network.checkpoints.parts import TRAINED_HERE, write_part
 from langflash_core.network.checkpoints.store import assemble_network, finite
 from langflash_core.network.checkpoints.stored import Stored, dequantised, read_stored, weights_file
+from langflash_core.network.encoders.deeplab import DeepLab
 from langflash_core.network.encoders.local import convert
 from langflash_core.network.guided import GuidedDepthNet
 from langflash_core.network.model import LangFlashNet
 from langflash_core.network.presets import PRESETS, GuidedDepth, Preset
+from langflash_core.network.semantics.second import SecondHead
 
 FORMAT = "langflash-weights-1"
 _MIN_QUANTISED = 4096  # numbers; smaller tensors are not worth a scale per row
@@ -62,7 +64,7 @@ def load_network(
         )
     with torch.device("meta"):  # no memory and no drawn numbers: it takes over those of the file
         network = build_network(PRESETS[preset]).eval()
-    load_strictly(network, with_deep(_tensors(stored.arrays)), path, assign=True)
+    load_strictly(network, completed(_tensors(stored.arrays)), path, assign=True)
     assert not any(buffer.is_meta for buffer in network.buffers())
     network.calibration = stored.header.get("calibration", {})
     return (network.use_bfloat16() if bfloat16 else network).to(device)
@@ -156,7 +158,15 @@ def read_weights(path: Path) -> tuple[dict[str, Shaped[Tensor, "..."]], dict]:
         WeightsError: there is none, or it is no safetensors file.
     """
     stored = read_stored(path)
-    return with_deep(_tensors(stored.arrays)), stored.header
+    return completed(_tensors(stored.arrays)), stored.header
+
+
+def completed(tensors: dict[str, Shaped[Tensor, "..."]]) -> dict[str, Shaped[Tensor, "..."]]:
+    """Tensors of a whole network, also from before depth had a late half of its own, and from before a second
+    network was asked, which then says nothing."""
+    second = any(name.startswith("second_head.") for name in tensors)
+    whole = any(name.startswith("language_head.taught.") for name in tensors)
+    return with_deep(tensors) | (silent_second() if whole and not second else {})
 
 
 def with_deep(tensors: dict[str, Shaped[Tensor, "..."]]) -> dict[str, Shaped[Tensor, "..."]]:
@@ -165,6 +175,19 @@ def with_deep(tensors: dict[str, Shaped[Tensor, "..."]]) -> dict[str, Shaped[Ten
         return tensors
     late = {name: value for name, value in tensors.items() if name.startswith("late.")}
     return tensors | {f"deep.{name.removeprefix('late.')}": value.clone() for name, value in late.items()}
+
+
+def silent_second() -> dict[str, Shaped[Tensor, "..."]]:
+    """Tensors of a second network that says nothing."""
+    preset = PRESETS["mini"]
+    assert isinstance(preset, GuidedDepth)
+    with torch.device("meta"):
+        modules = {"deeplab": DeepLab(), "second_head": SecondHead(preset)}
+    return {
+        f"{name}.{key}": torch.zeros(value.shape)
+        for name, module in modules.items()
+        for key, value in module.state_dict().items()
+    }
 
 
 def quantise(tensors: Mapping[str, Shaped[Tensor, "..."]]) -> dict[str, Shaped[Tensor, "..."]]:

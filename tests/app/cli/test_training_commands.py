@@ -254,6 +254,41 @@ def test_the_late_half_goes_on_with_other_photos(run, checkpoint, photos, tmp_pa
     assert "gone/images" in run("train", "late", tmp_path / "cache", *words, *where).err
 
 
+def test_the_second_network_is_learned_to_be_read(run, checkpoint, photos, tmp_path):
+    """Two steps on six photos and a room; the layer that reads it moves, and nothing else."""
+    write_shard(tmp_path / "cache" / "train" / "a.safetensors", [toy_record(0)])
+    for number in range(3, 7):
+        for folder in ("images", "labels"):
+            content = next((photos / folder).glob("1.*"))
+            (photos / folder / f"{number}{content.suffix}").write_bytes(content.read_bytes())
+    words = (
+        "train",
+        "second",
+        "--photos",
+        photos,
+        "-o",
+        tmp_path / "run",
+        "--minutes",
+        "5",
+        "--max-steps",
+        "2",
+    )
+    outcome = run(*words, "--start", checkpoint)
+    assert outcome.code == 0 and "2 steps" in outcome.out, outcome.err
+    out = tmp_path / "w.safetensors"
+    assert run("train", "export", tmp_path / "run", "-o", out, "--start", checkpoint).code == 0
+    before, after = (load_network("mini", path).state_dict() for path in (checkpoint, out))
+    assert {key.split(".")[0] for key in before if not torch.equal(before[key], after[key])} == {
+        "second_head"
+    }
+    blind = GuidedDepthNet(MINI)
+    for value in blind.deeplab.parameters():
+        torch.nn.init.zeros_(value)
+    save_network(blind, tmp_path / "blind.safetensors")
+    refused = run("train", "second", tmp_path / "cache", *words, "--start", tmp_path / "blind.safetensors")
+    assert refused.code == 2 and "holds no second network; give one with --weights" in refused.err
+
+
 def test_the_grouping_learns_from_named_and_outlined_photos(run, checkpoint, photos, tmp_path):
     """Three things at once: the outlines of a network that finds nothing, a step on photos of two kinds, and
     how well groups follow names."""
@@ -408,6 +443,22 @@ def test_a_walk_is_judged_kept_and_judged_beside_itself(run, checkpoint, tmp_pat
         (["train", "late", "gone", "--photos", "PHOTOS", "-o", "out", "--minutes", "1"], "no folder gone"),
         (["train", "late", ".", "--photos", "gone", "-o", "out", "--minutes", "1"], "no folder gone/images"),
         (["train", "late", ".", "-o", "out", "--minutes", "1"], "--photos"),
+        (["train", "second", "gone", "--photos", "PHOTOS", "-o", "out", "--minutes", "1"], "no folder gone"),
+        (
+            [
+                "train",
+                "second",
+                "--photos",
+                "PHOTOS",
+                "-o",
+                "out",
+                "--minutes",
+                "1",
+                "--weights",
+                "gone.tflite",
+            ],
+            "gone.tflite",
+        ),
         (
             ["train", "late", ".", "--photos", "PHOTOS", "-o", "out", "--minutes", "1"],
             "langflash train cache",

@@ -226,7 +226,7 @@ def judge_room(setting: Setting, fits: Fits, record: RoomRecord) -> Tally:
         prediction,
         features,
         pixels,
-        Seen(tokens, prediction.depths, prediction.viewmats, views.Ks),
+        Seen(views.images, tokens, prediction.depths, prediction.viewmats, views.Ks),
         truth.flatten(),
         true_scale(prediction.depths[0], record.depths[0].float()),
         tally,

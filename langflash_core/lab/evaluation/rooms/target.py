@@ -65,7 +65,7 @@ def judge_views(
         small = F.adaptive_avg_pool2d(prediction.weights, size)[None]
         averaged = average_atoms(small, features)[0]
         masks = true_masks(record, (0, 1))  # (V, G', H, W)
-        seen = Seen(tokens, prediction.depths, prediction.viewmats, source.Ks)
+        seen = Seen(source.images, tokens, prediction.depths, prediction.viewmats, source.Ks)
         renamed = network.named(averaged, small[0], seen)
         true_atoms = network.dictionary(masks, features, seen)
         alone = language_maps(network, target)[0][0, 0]

@@ -1,0 +1,148 @@
+"""Learning what a second network's maps mean: pixels that are drawn, that it learns, that a run keeps it."""
+
+import math
+
+import numpy as np
+import pytest
+import torch
+
+from langflash_core.lab.photos import open_folder
+from langflash_core.lab.photos.names import CLASSES37
+from langflash_core.lab.photos.writing import FolderWriter
+from langflash_core.lab.training.further import Sets, train_second
+from langflash_core.lab.training.loop import LoopOptions, Optimising
+from langflash_core.lab.training.second import (
+    DRAWN,
+    PARTLY_PIXELS,
+    PIXELS,
+    ROOM_PIXELS,
+    KeptPixels,
+    PixelBatch,
+    PixelSet,
+    RoomPixels,
+    second_stage,
+)
+from langflash_core.lab.training.shards import Label
+from langflash_core.lab.training.states import load_averaged
+from langflash_core.lab.training.words import build_table
+from langflash_core.network import MINI
+from langflash_core.network.build import build_network
+
+from .conftest import encode
+
+TINTS = np.array([[90, 90, 90], [220, 30, 30], [30, 30, 220]], np.uint8)
+WALL, CHAIR = CLASSES37.index("wall"), CLASSES37.index("chair")
+
+
+def folder(root, count: int, *, labelled: float):
+    """Photos of a wall, red, with a chair, blue, of which a share of the columns is labelled."""
+    writer = FolderWriter(root)
+    for number in range(1, count + 1):
+        labels = np.ones((84, 112), np.int64)
+        labels[20:70, 5 * number : 5 * number + 50] = 2
+        writer.photo(str(number), TINTS[labels])
+        if labelled:
+            labels[:, round(labelled * 112) :] = 0
+            writer.labels(str(number), labels)
+    writer.finish({1: ("wall", None), 2: ("chair", None)} if labelled else {}, "drawn by a test")
+    return open_folder(root)
+
+
+@pytest.fixture(scope="module")
+def learned(tmp_path_factory):
+    root = tmp_path_factory.mktemp("sets")
+    main = folder(root / "main", 6, labelled=1)
+    more = [folder(root / "outlines", 3, labelled=0.3), folder(root / "plain", 2, labelled=0)]
+    return Sets.of(main, main.ids, more, encode).named()
+
+
+@pytest.fixture(scope="module")
+def network():
+    """One whose layers keep the size of what they read (He et al. 2015), so that maps tell colours apart."""
+    torch.manual_seed(0)
+    made = build_network(MINI).eval()
+    for layer in made.deeplab.modules():
+        if isinstance(layer, torch.nn.Conv2d):
+            torch.nn.init.kaiming_normal_(layer.weight)
+    return made
+
+
+@pytest.fixture(scope="module")
+def pixels(learned, network):
+    return PixelSet.of(network.deeplab, learned, torch.Generator().manual_seed(0))
+
+
+def test_photos_without_names_are_left_and_partly_named_ones_give_less(learned, pixels):
+    assert [one.folder.root.name for one in learned.sets] == ["main", "outlines"]
+    counts = torch.bincount(pixels.table.sets)
+    assert counts.tolist() == [6 * PIXELS, len(learned.sets[1].ids) * PARTLY_PIXELS]
+    assert set(pixels.table.classes.tolist()) == {WALL, CHAIR}
+
+
+def test_what_is_seen_lies_under_what_it_is_called(pixels, network):
+    """The layers are random, but some channel has another mean over red than over blue, by a half of what
+    it changes within both; labels of other pixels would leave nothing of it."""
+    table = pixels.table
+    red, blue = (table.maps[table.classes == row].float() for row in (WALL, CHAIR))
+    apart = (red.mean(0) - blue.mean(0)).abs() / (red.std(0) + blue.std(0) + 1e-6)
+    mixed = table.maps[torch.randperm(len(table.maps), generator=torch.Generator().manual_seed(0))].float()
+    other, rest = mixed[: len(red)], mixed[len(red) :]
+    chance = (other.mean(0) - rest.mean(0)).abs() / (other.std(0) + rest.std(0) + 1e-6)
+    assert float(apart.max()) > 0.5 > 5 * float(chance.max())
+
+
+def test_classes_come_as_they_are_and_names_alike():
+    classes = torch.tensor([0] * 900 + [1] * 100 + [-1] * 50)
+    names = torch.tensor([3] * 900 + [-1] * 100 + [7] * 50)
+    table = PixelBatch(torch.arange(1050.0)[:, None], classes, names, torch.zeros(1050, dtype=torch.int64))
+    drawn = PixelSet(table).draw(8, 1, torch.Generator().manual_seed(0))
+    half = 8 * DRAWN // 2
+    assert len(drawn.classes) == 2 * half and bool((drawn.classes[:half] >= 0).all())
+    assert torch.equal(table.classes[drawn.maps[:, 0].long()], drawn.classes), "rows stay together"
+    # 3000 draws: shares are off by 3 sigma, 3 sqrt(p (1 - p) / 3000), at most.
+    assert float((drawn.classes[:half] == 1).float().mean()) == pytest.approx(0.1, abs=0.017)
+    assert float((drawn.names[half:] == 7).float().mean()) == pytest.approx(0.5, abs=0.028)
+
+
+def test_rooms_teach_their_phrases(network, learned, pixels, rooms, words):
+    """Of the toy rooms' pixels, each thing has a share; after 150 steps they answer to their phrases."""
+    seen = RoomPixels.of(network.deeplab, rooms, words)
+    assert {label.group for label in seen.labels} == {"wall", "floor", "sofa", "table"}
+    assert len(seen.maps) == len(seen.things) == 4 * 2 * ROOM_PIXELS
+    assert float(torch.bincount(seen.things).float().min()) > 0.1 * len(seen.things)
+    head, stage = network.second_head, second_stage(learned.bank)
+    with torch.random.fork_rng():
+        torch.manual_seed(0)
+        head.reset_parameters()
+    both = PixelSet(pixels.table, seen)
+    optimiser = torch.optim.Adam(head.parameters(), 0.01)
+    first = last = 0.0
+    for step in range(150):
+        loss = stage.loss(network, both.draw(1, 1, words.generator).to("cpu"), words)
+        optimiser.zero_grad()
+        loss.total.backward()
+        optimiser.step()
+        first, last = (loss.parts["phrases"] if step == 0 else first), loss.parts["phrases"]
+    # Random layers tell colours and edges alone, so that it falls slowly, but by much more than it jumps.
+    assert math.isfinite(last) and last < 0.8 * first
+
+
+def test_it_learns_and_a_run_keeps_it(learned, network, pixels, tmp_path):
+    table = build_table([Label("wall", "wall"), Label("chair", "chair")], encode)
+    options = LoopOptions(
+        minutes=5, max_steps=60, ema_decay=0.9, learning_rate=0.01, optimising=Optimising(warm_up=5)
+    )
+    judge = KeptPixels(pixels, learned.bank)
+    torch.manual_seed(2)
+    network.second_head.reset_parameters()
+    before, eyes = judge(network), network.deeplab.stem.weight.clone()
+    train_second(network, learned, None, None, table, tmp_path, options)
+    after = judge(network)
+    assert before["classes_accuracy"] < 0.75 and after["classes_accuracy"] > 0.95
+    assert torch.equal(network.deeplab.stem.weight.cpu(), eyes), "the network itself learns nothing"
+    torch.manual_seed(1)
+    other = build_network(MINI)
+    assert load_averaged(other, tmp_path, "second") is not None
+    for name in ("deeplab", "second_head"):
+        own, kept = (getattr(one, name).state_dict() for one in (network, other))
+        assert all(torch.equal(own[key].cpu(), kept[key]) for key in own)

@@ -1,0 +1,150 @@
+"""The second network: its layers against a plain loop, what it says of parts, and that it can be silent."""
+
+import pytest
+import torch
+from torch import nn
+from torch.nn import functional as F
+
+from langflash_core.network import MINI
+from langflash_core.network.checkpoints.files import completed, load_network
+from langflash_core.network.encoders.deeplab import CHANNELS, SIDE, DeepLab, framed, seen
+from langflash_core.network.encoders.shared import Tokens
+from langflash_core.network.model import Seen
+from langflash_core.network.semantics.naming import describe, places
+from langflash_core.network.semantics.second import COUNTS, SecondHead, both, looked_at
+
+
+@pytest.fixture(scope="module")
+def deeplab() -> DeepLab:
+    torch.manual_seed(0)
+    return DeepLab().eval()
+
+
+def at(x: torch.Tensor, layer: nn.Conv2d, row: int, column: int) -> float:
+    """One number of a depthwise layer as TensorFlow's SAME has it, from what lies around it."""
+    stride, dilation = layer.stride[0], layer.dilation[0]
+    assert layer.bias is not None
+    total = float(layer.bias[0])
+    for i in range(3):
+        for j in range(3):
+            places = []
+            for place, step, length in ((row, i, x.shape[-2]), (column, j, x.shape[-1])):
+                given = -(-length // stride)
+                over = max(0, (given - 1) * stride + 2 * dilation + 1 - length)
+                places.append(place * stride + step * dilation - over // 2)
+            y, z = places
+            if 0 <= y < x.shape[-2] and 0 <= z < x.shape[-1]:
+                total += float(layer.weight[0, 0, i, j]) * float(x[0, 0, y, z])
+    return total
+
+
+@torch.inference_mode()
+@pytest.mark.parametrize("stride, dilation", [(1, 1), (2, 1), (1, 2)])
+@pytest.mark.parametrize("size", [(7, 8), (1, 5), (6, 6)])
+def test_a_layer_frames_what_it_reads_as_tensorflow_does(stride, dilation, size):
+    torch.manual_seed(1)
+    layer = nn.Conv2d(1, 1, 3, stride, dilation=dilation).double()
+    x = torch.randn(1, 1, *size, dtype=torch.float64)
+    found = layer(framed(x, layer))
+    assert found.shape[-2:] == tuple(-(-length // stride) for length in size)
+    for row in range(found.shape[-2]):
+        for column in range(found.shape[-1]):
+            assert float(found[0, 0, row, column]) == pytest.approx(at(x, layer, row, column), abs=1e-12)
+
+
+@torch.inference_mode()
+@pytest.mark.parametrize("size", [(196, 252), (252, 196), (40, 1000), (3, 2)])
+def test_it_sees_pictures_of_any_shape_at_one_size(deeplab, size):
+    torch.manual_seed(2)
+    picture = torch.rand(1, 3, *size)
+    assert max(seen(picture).shape[-2:]) == SIDE
+    maps = deeplab(picture)
+    height, width = (-(-length // 4) for length in seen(picture).shape[-2:])
+    assert maps.shape == (1, CHANNELS, height, width) and bool(torch.isfinite(maps).all())
+    assert float(maps.min()) >= 0
+
+
+@torch.inference_mode()
+def test_single_precision_is_enough(deeplab):
+    """Some 30 layers of sums over up to 960 numbers, each off by 1e-7 of its size at random: 1e-5."""
+    picture = torch.rand(1, 3, 56, 70, generator=torch.manual_seed(3))
+    fast = deeplab(picture)
+    slow = DeepLab().eval().double()
+    slow.load_state_dict(deeplab.state_dict())
+    exact = slow(picture.double())
+    assert float((fast - exact).abs().max()) < 1e-5 * float(exact.abs().max())
+
+
+@torch.inference_mode()
+def test_a_part_is_the_mean_of_its_pixels(deeplab):
+    torch.manual_seed(4)
+    images, weights = torch.rand(2, 3, 56, 70), torch.rand(2, 4, 8, 10).softmax(1)
+    weights[:, 3] = 0
+    head = SecondHead(MINI)
+    head.reset_parameters()
+    found = looked_at(deeplab, head, images, weights)
+    maps = torch.cat([F.interpolate(deeplab(one[None]), (8, 10), mode="bilinear") for one in images]).double()
+    said = torch.einsum("oc,vchw->vohw", head.weight.double(), maps) + head.bias.double()[:, None, None]
+    said = said / said.norm(dim=1, keepdim=True)
+    for part in range(3):
+        own = weights[:, part].double()
+        slow = (said * own[:, None]).sum((0, 2, 3)) / own.sum()
+        # Sums of 160 numbers in single precision, and the millionth that keeps empty parts from 0 / 0.
+        assert float((found[part] - slow).abs().max()) < 1e-5 * float(slow.abs().max())
+    assert not found[3].any(), "a part that no pixel shows says nothing"
+
+
+def test_odds_are_added():
+    """Log odds between two words, of an atom that both made, are the sum of both's, times its length."""
+    torch.manual_seed(5)
+    first, second = F.normalize(torch.randn(3, 384), dim=1), 0.3 * torch.randn(3, 384)
+    texts = F.normalize(torch.randn(2, 384), dim=1)
+    atoms = both(first, second)
+    odds = (atoms @ (texts[0] - texts[1])) * (first + COUNTS * second).norm(dim=1)
+    assert torch.allclose(odds, (first + COUNTS * second) @ (texts[0] - texts[1]), atol=1e-6)
+    assert torch.allclose(atoms.norm(dim=1), torch.ones(3), atol=1e-6)
+    assert torch.allclose(both(first, torch.zeros_like(first)), first, atol=1e-7)
+
+
+@pytest.fixture(scope="module")
+def network():
+    return load_network("mini")
+
+
+def saw(network) -> tuple[torch.Tensor, torch.Tensor, Seen]:
+    torch.manual_seed(6)
+    hooks = tuple(torch.randn(1, 1, 16, MINI.encoder_dim) for _ in range(4))
+    tokens = Tokens(hooks, (4, 4), named=hooks[-2:])
+    atoms, weights = F.normalize(torch.randn(3, 384), dim=1), torch.rand(1, 3, 16, 16).softmax(1)
+    K = torch.tensor([[60.0, 0, 28], [0, 60, 28], [0, 0, 1]])[None]
+    seen_of = Seen(torch.rand(1, 3, 56, 56), tokens, torch.rand(1, 56, 56) + 1, torch.eye(4)[None], K)
+    return atoms, weights, seen_of
+
+
+@torch.inference_mode()
+def test_what_has_learned_is_asked_and_what_is_silent_is_not(network, monkeypatch):
+    atoms, weights, seen_of = saw(network)
+    monkeypatch.setattr(network, "deeplab", DeepLab().eval())
+    monkeypatch.setattr(network, "second_head", SecondHead(MINI))
+    network.second_head.reset_parameters()
+    said = network.named(atoms, weights, seen_of)
+    where = places(weights, seen_of.depths, seen_of.viewmats, seen_of.Ks)
+    alone = network.namer(atoms, describe(weights, seen_of.tokens), where)
+    second = looked_at(network.deeplab, network.second_head, seen_of.images, weights)
+    assert torch.equal(said, both(alone, second)) and not torch.equal(said, alone)
+    monkeypatch.setattr(network, "second_head", SecondHead(MINI))
+    monkeypatch.setattr(network, "deeplab", None)
+    assert torch.equal(network.named(atoms, weights, seen_of), alone)
+
+
+def test_weights_from_before_it_say_nothing(network):
+    own = network.state_dict()
+    old = {name: value for name, value in own.items() if name.split(".")[0] not in ("deeplab", "second_head")}
+    filled = completed(old)
+    assert filled.keys() == own.keys()
+    assert {name: value.shape for name, value in filled.items()} == {k: v.shape for k, v in own.items()}
+    new = filled.keys() - old.keys()
+    assert new and not any(bool(filled[name].any()) for name in new)
+    assert completed(own) == own, "what is there stays"
+    foreign = {"conv.weight": torch.ones(1)}
+    assert completed(foreign) == foreign
