@@ -4,7 +4,7 @@ The network itself stays as it is, so that its maps of every photo are found onc
 are drawn from them. One layer reads them and learns alone what they are called among the 37 classes, all
 names that the photos' sets have and the phrases of rendered rooms, as L(x) did, in the texts' own space.
 Whoever learned beside the first network, which knows the learned photos by heart, would be heard too little.
-Without rooms it forgets what photos do not name: of other words for things .26 instead of .41 (MEASURED.md).
+Rendered rooms lose by it nevertheless (MEASURED.md).
 
 Sizes: P pixels, F channels of the maps, V views.
 
