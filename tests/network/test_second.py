@@ -106,7 +106,7 @@ def test_odds_are_added():
     assert torch.allclose(both(first, torch.zeros_like(first)), first, atol=1e-7)
 
 
-@pytest.fixture(scope="module")
+@pytest.fixture
 def network():
     return load_network("mini")
 
@@ -122,18 +122,16 @@ def saw(network) -> tuple[torch.Tensor, torch.Tensor, Seen]:
 
 
 @torch.inference_mode()
-def test_what_has_learned_is_asked_and_what_is_silent_is_not(network, monkeypatch):
+def test_what_has_learned_is_asked_and_what_is_silent_is_not(network):
     atoms, weights, seen_of = saw(network)
-    monkeypatch.setattr(network, "deeplab", DeepLab().eval())
-    monkeypatch.setattr(network, "second_head", SecondHead(MINI))
+    network.deeplab, network.second_head = DeepLab().eval(), SecondHead(MINI)
     network.second_head.reset_parameters()
     said = network.named(atoms, weights, seen_of)
     where = places(weights, seen_of.depths, seen_of.viewmats, seen_of.Ks)
     alone = network.namer(atoms, describe(weights, seen_of.tokens), where)
     second = looked_at(network.deeplab, network.second_head, seen_of.images, weights)
     assert torch.equal(said, both(alone, second)) and not torch.equal(said, alone)
-    monkeypatch.setattr(network, "second_head", SecondHead(MINI))
-    monkeypatch.setattr(network, "deeplab", None)
+    network.deeplab, network.second_head = None, SecondHead(MINI)
     assert torch.equal(network.named(atoms, weights, seen_of), alone)
 
 

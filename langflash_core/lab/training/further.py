@@ -132,7 +132,11 @@ def train_second(
     run_dir: Path,
     options: LoopOptions,
 ) -> LoopState:
-    """Train what reads the second network's maps, from nothing, judged by `kept`: `RUN/second.pt`."""
+    """Train what reads the second network's maps, from nothing, judged by `kept`: `RUN/second.pt`.
+
+    Raises:
+        InputError: a photo cannot be used, or they teach nothing.
+    """
     net = guided(network)
     with torch.random.fork_rng(devices=()):
         torch.manual_seed(options.seed)
@@ -141,6 +145,7 @@ def train_second(
     net.deeplab.to(options.device)
     seen = None if rooms is None else RoomPixels.of(net.deeplab, rooms, words)
     pixels = PixelSet.of(net.deeplab, photos, words.generator, seen)
+    pixels.check()
     judge = None if kept is None else KeptPixels(PixelSet.of(net.deeplab, kept, words.generator), photos.bank)
     return train_stage(net, second_stage(photos.bank), pixels, words, run_dir, options, judge)
 

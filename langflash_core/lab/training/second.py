@@ -21,8 +21,9 @@ import torch
 from torch import Tensor
 from torch.nn import functional as F
 
+from langflash_core.errors import InputError
 from langflash_core.lab.photos.fitting import fitted
-from langflash_core.lab.training.bank import NameBank
+from langflash_core.lab.training.bank import MIN_PHOTOS, NameBank
 from langflash_core.lab.training.batches import RoomSet
 from langflash_core.lab.training.fewlabels import class_loss, name_loss
 from langflash_core.lab.training.live import SIZES
@@ -162,6 +163,17 @@ class PixelSet:
 
     def __len__(self) -> int:
         return len(self.table.classes)
+
+    def check(self) -> None:
+        """
+        Raises:
+            InputError: there is nothing to draw.
+        """
+        if not len(self._classed) or not len(self._shown):
+            raise InputError(
+                f"the photos show none of the 37 classes, or no name that {MIN_PHOTOS} of them show; give "
+                "more labelled photos"
+            )
 
     def draw(self, count: int, views: int, generator: torch.Generator) -> PixelBatch:
         """`count` times `DRAWN` pixels, half of them as classes come, half of all names alike."""

@@ -257,30 +257,20 @@ def test_the_late_half_goes_on_with_other_photos(run, checkpoint, photos, tmp_pa
 def test_the_second_network_is_learned_to_be_read(run, checkpoint, photos, tmp_path):
     """Two steps on six photos and a room; the layer that reads it moves, and nothing else."""
     write_shard(tmp_path / "cache" / "train" / "a.safetensors", [toy_record(0)])
+    few = ("--photos", photos, "-o", tmp_path / "few", "--minutes", "1", "--start", checkpoint)
+    assert "no name that 5 of them show" in run("train", "second", tmp_path / "cache", *few).err
     for number in range(3, 7):
         for folder in ("images", "labels"):
             content = next((photos / folder).glob("1.*"))
             (photos / folder / f"{number}{content.suffix}").write_bytes(content.read_bytes())
-    words = (
-        "train",
-        "second",
-        "--photos",
-        photos,
-        "-o",
-        tmp_path / "run",
-        "--minutes",
-        "5",
-        "--max-steps",
-        "2",
-    )
-    outcome = run(*words, "--start", checkpoint)
+    words = ("--photos", photos, "-o", tmp_path / "run", "--minutes", "5", "--max-steps", "2")
+    outcome = run("train", "second", tmp_path / "cache", *words, "--start", checkpoint)
     assert outcome.code == 0 and "2 steps" in outcome.out, outcome.err
     out = tmp_path / "w.safetensors"
     assert run("train", "export", tmp_path / "run", "-o", out, "--start", checkpoint).code == 0
     before, after = (load_network("mini", path).state_dict() for path in (checkpoint, out))
-    assert {key.split(".")[0] for key in before if not torch.equal(before[key], after[key])} == {
-        "second_head"
-    }
+    moved = {key.split(".")[0] for key in before if not torch.equal(before[key], after[key])}
+    assert moved == {"second_head"}
     blind = GuidedDepthNet(MINI)
     for value in blind.deeplab.parameters():
         torch.nn.init.zeros_(value)
@@ -448,6 +438,7 @@ def test_a_walk_is_judged_kept_and_judged_beside_itself(run, checkpoint, tmp_pat
             [
                 "train",
                 "second",
+                ".",
                 "--photos",
                 "PHOTOS",
                 "-o",

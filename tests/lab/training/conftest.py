@@ -7,11 +7,14 @@ them at once; no encoder has to run.
 from collections.abc import Callable, Sequence
 from pathlib import Path
 
+import numpy as np
 import pytest
 import torch
 from torch import Tensor
 from torch.nn import functional as F
 
+from langflash_core.lab.photos import PhotoFolder, open_folder
+from langflash_core.lab.photos.writing import FolderWriter
 from langflash_core.lab.training.batches import RoomSet
 from langflash_core.lab.training.shards import Label, RoomRecord, quantise_tokens, write_shard
 from langflash_core.lab.training.stages.stage import Words
@@ -19,6 +22,7 @@ from langflash_core.lab.training.words import PhraseSampler, build_table
 from langflash_core.network import MINI, GuidedDepthNet
 
 SIZE = 112  # pixels: a token grid of 8 x 8
+TINTS = np.array([[90, 90, 90], [220, 30, 30], [30, 30, 220]], np.uint8)
 NAMES = (("plain wall", "wall"), ("wooden floor", "floor"), ("red sofa", "sofa"), ("oak table", "table"))
 
 
@@ -60,6 +64,22 @@ def _toy_tokens(ids: Tensor) -> Tensor:
     shares = F.one_hot(ids, 4).float().permute(0, 3, 1, 2)
     patches = F.avg_pool2d(shares, 14).flatten(2).transpose(1, 2)  # (V, 64, 4)
     return (patches @ codes + 0.3 * places)[:, None].repeat(1, 4, 1, 1)
+
+
+def red_walls(root: Path, count: int, *, labelled: float) -> PhotoFolder:
+    """Photos of a wall, red, with a chair, blue, of which a share of the columns is labelled."""
+    writer = FolderWriter(root)
+    for number in range(1, count + 1):
+        labels = np.ones((84, 112), np.int64)
+        labels[20:70, 5 * number : 5 * number + 50] = 2
+        writer.photo(str(number), TINTS[labels])
+        if labelled:
+            labels[:, round(labelled * 112) :] = 0
+            writer.labels(str(number), labels)
+        if labelled == 1:
+            writer.depths(str(number), np.full((84, 112), 2.0))
+    writer.finish({1: ("wall", None), 2: ("chair", None)} if labelled else {}, "drawn by a test")
+    return open_folder(root)
 
 
 @pytest.fixture(scope="session")

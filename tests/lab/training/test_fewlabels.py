@@ -10,9 +10,7 @@ import pytest
 import torch
 from torch.nn import functional as F
 
-from langflash_core.lab.photos import open_folder
 from langflash_core.lab.photos.names import CLASSES37
-from langflash_core.lab.photos.writing import FolderWriter
 from langflash_core.lab.training import fewlabels
 from langflash_core.lab.training.bank import NameBank
 from langflash_core.lab.training.batches import RoomSet
@@ -36,32 +34,14 @@ from langflash_core.network import MINI
 from langflash_core.network.build import build_network
 from langflash_core.network.encoders.late import LateHalf
 
-from .conftest import NAMES, encode, toy_record
-
-TINTS = np.array([[90, 90, 90], [220, 30, 30], [30, 30, 220]], np.uint8)
-
-
-def folder(root, count: int, *, labelled: float):
-    """Photos of a wall, red, with a chair, blue, of which a share of the columns is labelled."""
-    writer = FolderWriter(root)
-    for number in range(1, count + 1):
-        labels = np.ones((84, 112), np.int64)
-        labels[20:70, 5 * number : 5 * number + 50] = 2
-        writer.photo(str(number), TINTS[labels])
-        if labelled:
-            labels[:, round(labelled * 112) :] = 0
-            writer.labels(str(number), labels)
-        if labelled == 1:
-            writer.depths(str(number), np.full((84, 112), 2.0))
-    writer.finish({1: ("wall", None), 2: ("chair", None)} if labelled else {}, "drawn by a test")
-    return open_folder(root)
+from .conftest import NAMES, encode, red_walls, toy_record
 
 
 @pytest.fixture(scope="module")
 def sets(tmp_path_factory):
     root = tmp_path_factory.mktemp("sets")
-    main = folder(root / "main", 6, labelled=1)
-    more = [folder(root / "outlines", 3, labelled=0.3), folder(root / "plain", 2, labelled=0)]
+    main = red_walls(root / "main", 6, labelled=1)
+    more = [red_walls(root / "outlines", 3, labelled=0.3), red_walls(root / "plain", 2, labelled=0)]
     return Sets.of(main, main.ids, more, encode)
 
 

@@ -2,13 +2,10 @@
 
 import math
 
-import numpy as np
 import pytest
 import torch
 
-from langflash_core.lab.photos import open_folder
 from langflash_core.lab.photos.names import CLASSES37
-from langflash_core.lab.photos.writing import FolderWriter
 from langflash_core.lab.training.further import Sets, train_second
 from langflash_core.lab.training.loop import LoopOptions, Optimising
 from langflash_core.lab.training.second import (
@@ -28,31 +25,16 @@ from langflash_core.lab.training.words import build_table
 from langflash_core.network import MINI
 from langflash_core.network.build import build_network
 
-from .conftest import encode
+from .conftest import encode, red_walls
 
-TINTS = np.array([[90, 90, 90], [220, 30, 30], [30, 30, 220]], np.uint8)
 WALL, CHAIR = CLASSES37.index("wall"), CLASSES37.index("chair")
-
-
-def folder(root, count: int, *, labelled: float):
-    """Photos of a wall, red, with a chair, blue, of which a share of the columns is labelled."""
-    writer = FolderWriter(root)
-    for number in range(1, count + 1):
-        labels = np.ones((84, 112), np.int64)
-        labels[20:70, 5 * number : 5 * number + 50] = 2
-        writer.photo(str(number), TINTS[labels])
-        if labelled:
-            labels[:, round(labelled * 112) :] = 0
-            writer.labels(str(number), labels)
-    writer.finish({1: ("wall", None), 2: ("chair", None)} if labelled else {}, "drawn by a test")
-    return open_folder(root)
 
 
 @pytest.fixture(scope="module")
 def learned(tmp_path_factory):
     root = tmp_path_factory.mktemp("sets")
-    main = folder(root / "main", 6, labelled=1)
-    more = [folder(root / "outlines", 3, labelled=0.3), folder(root / "plain", 2, labelled=0)]
+    main = red_walls(root / "main", 6, labelled=1)
+    more = [red_walls(root / "outlines", 3, labelled=0.3), red_walls(root / "plain", 2, labelled=0)]
     return Sets.of(main, main.ids, more, encode).named()
 
 
