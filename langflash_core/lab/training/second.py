@@ -109,8 +109,8 @@ class PixelBatch:
         rooms = self.rooms
         if rooms is not None:
             rooms = RoomPixels(rooms.maps.to(device).float(), rooms.things, rooms.labels)
-        own = (part.to(device) for part in (self.classes, self.names, self.sets))
-        return PixelBatch(self.maps.to(device).float(), *own, rooms)
+        classes, names, sets = (part.to(device) for part in (self.classes, self.names, self.sets))
+        return PixelBatch(self.maps.to(device).float(), classes, names, sets, rooms)
 
     def at(self, rows: Tensor | slice) -> "PixelBatch":
         """Some pixels."""
@@ -141,22 +141,22 @@ class PixelSet:
         """
         most_of = [PIXELS if labelled_share(one) >= WHOLE else PARTLY_PIXELS for one in pool.sets]
         room = sum(most * len(one.ids) for most, one in zip(most_of, pool.sets, strict=True))
-        table = PixelBatch(  # at once: pieces between what a look takes would keep memory from its reuse
-            torch.empty(room, CHANNELS, dtype=torch.float16), *(torch.empty(3, room, dtype=torch.int64))
-        )
+        classes, names, sets = torch.empty(3, room, dtype=torch.int64)
+        # At once: pieces between what a look takes would keep memory from its reuse.
+        table = PixelBatch(torch.empty(room, CHANNELS, dtype=torch.float16), classes, names, sets)
         filled = 0
         for one, number, most in zip(pool.sets, pool.numbers, most_of, strict=True):
             for row in range(len(one.ids)):
                 view = fitted(one.photo(row), SIZES[0])
                 maps = _maps(deeplab, view.rgb.float() / 255)
                 ids = nearest(view.labels, (maps.shape[-2], maps.shape[-1])).flatten()
-                classes, names = pool.bank.class_of[number][ids], pool.bank.name_of[number][ids]
-                known = ((classes >= 0) | (names >= 0)).nonzero()[:, 0]
+                of_class, of_name = pool.bank.class_of[number][ids], pool.bank.name_of[number][ids]
+                known = ((of_class >= 0) | (of_name >= 0)).nonzero()[:, 0]
                 drawn = known[torch.randperm(len(known), generator=generator)[:most]]
                 own = slice(filled, filled + len(drawn))
                 filled = own.stop
                 table.maps[own] = maps.flatten(1).T[drawn.to(maps.device)].cpu()
-                table.classes[own], table.names[own] = classes[drawn], names[drawn]
+                table.classes[own], table.names[own] = of_class[drawn], of_name[drawn]
                 table.sets[own] = number
             log.info("%s: %d photos looked at", one.folder.root.name, len(one.ids))
         return PixelSet(table.at(slice(filled)), rooms)

@@ -20,15 +20,14 @@ from langflash_core.network import MINI
 from langflash_core.network.build import build_network
 from langflash_core.network.encoders.late import LateHalf
 
-from .conftest import NAMES, encode, toy_record
-from .test_fewlabels import folder
+from .conftest import NAMES, encode, red_walls, toy_record
 
 
 @pytest.fixture(scope="module")
 def sets(tmp_path_factory):
     root = tmp_path_factory.mktemp("sets")
-    main = folder(root / "main", 4, labelled=1)
-    more = [folder(root / "outlines", 3, labelled=0.3), folder(root / "plain", 2, labelled=0)]
+    main = red_walls(root / "main", 4, labelled=1)
+    more = [red_walls(root / "outlines", 3, labelled=0.3), red_walls(root / "plain", 2, labelled=0)]
     return Sets.of(main, main.ids, more, encode)
 
 
