@@ -4,8 +4,8 @@ What it says is turned into evidence for and against each of the 37 classes and 
 its own names are and however it was trained: log P(said | class) - log P(said), in nats. Added to the
 logits of who looks himself it gives the odds of both together, as far as they err independently (Bayes).
 
-On the kept photos of NYU Depth v2 the shipped features name .300 of the 37 classes alone and .324 with such
-evidence of a DeepLab of 2.3 MB, which alone names half as well (MEASURED.md).
+On the kept photos of NYU Depth v2 the eighth version's features name .300 of the 37 classes alone and .324
+with such evidence of a DeepLab of 2.3 MB, which alone names half as well (MEASURED.md).
 """
 
 from collections.abc import Iterable, Mapping
