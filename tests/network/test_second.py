@@ -11,7 +11,15 @@ from langflash_core.network.encoders.deeplab import CHANNELS, SIDE, DeepLab, fra
 from langflash_core.network.encoders.shared import Tokens
 from langflash_core.network.model import Seen
 from langflash_core.network.semantics.naming import describe, places
-from langflash_core.network.semantics.second import COUNTS, SecondHead, both, looked_at
+from langflash_core.network.semantics.second import (
+    COUNTS,
+    PHOTOS,
+    STEEPNESS,
+    TOGETHER,
+    SecondHead,
+    both,
+    looked_at,
+)
 
 
 @pytest.fixture(scope="module")
@@ -81,17 +89,35 @@ def test_a_part_is_the_mean_of_its_pixels(deeplab):
     images, weights = torch.rand(2, 3, 56, 70), torch.rand(2, 4, 8, 10).softmax(1)
     weights[:, 3] = 0
     head = SecondHead(MINI)
-    head.reset_parameters()
+    head.begin()
+    nn.init.normal_(head.photo.weight, std=1e-3)
     found = looked_at(deeplab, head, images, weights)
     maps = torch.cat([F.interpolate(deeplab(one[None]), (8, 10), mode="bilinear") for one in images]).double()
-    said = torch.einsum("oc,vchw->vohw", head.weight.double(), maps) + head.bias.double()[:, None, None]
+    words = head.words.weight.double(), head.words.bias.double()
+    said = torch.einsum("oc,vchw->vohw", words[0], maps) + words[1][:, None, None]
     said = said / said.norm(dim=1, keepdim=True)
+    odds = STEEPNESS * torch.einsum("c,vchw->vhw", head.photo.weight[0].double(), maps).mean()
+    said = said / (1 + torch.exp(-TOGETHER * odds) / PHOTOS)
     for part in range(3):
         own = weights[:, part].double()
         slow = (said * own[:, None]).sum((0, 2, 3)) / own.sum()
         # Sums of 160 numbers in single precision, and the millionth that keeps empty parts from 0 / 0.
         assert float((found[part] - slow).abs().max()) < 1e-5 * float(slow.abs().max())
     assert not found[3].any(), "a part that no pixel shows says nothing"
+
+
+@torch.inference_mode()
+def test_it_is_heard_as_far_as_a_scene_looks_like_photos(deeplab):
+    torch.manual_seed(7)
+    images, weights = torch.rand(2, 3, 56, 70), torch.rand(2, 4, 8, 10).softmax(1)
+    head = SecondHead(MINI)
+    head.begin()
+    unsure = looked_at(deeplab, head, images, weights)
+    for odds, heard in ((20.0, 1.0), (-20.0, 0.0)):
+        nn.init.constant_(head.photo.bias, odds / STEEPNESS)
+        said = looked_at(deeplab, head, images, weights)
+        # Twice 20 nats are e^-40 from certainty; who knows nothing expects three photos of four.
+        assert torch.allclose(said, heard * unsure * (1 + 1 / PHOTOS), atol=1e-7)
 
 
 def test_odds_are_added():
@@ -125,7 +151,7 @@ def saw(network) -> tuple[torch.Tensor, torch.Tensor, Seen]:
 def test_what_has_learned_is_asked_and_what_is_silent_is_not(network, monkeypatch):
     atoms, weights, seen_of = saw(network)
     network.deeplab, network.second_head = DeepLab().eval(), SecondHead(MINI)
-    network.second_head.reset_parameters()
+    network.second_head.begin()
     said = network.named(atoms, weights, seen_of)
     where = places(weights, seen_of.depths, seen_of.viewmats, seen_of.Ks)
     alone = network.namer(atoms, describe(weights, seen_of.tokens), where)

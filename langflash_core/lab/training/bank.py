@@ -8,7 +8,7 @@ Sizes: S sets, N names, C channels of the language space.
 
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import torch
@@ -98,6 +98,16 @@ class NameBank:
             torch.stack([_denied(one, at, names) for one, (_, names) in zip(sets, rows, strict=True)]),
             _classes_of(sets, texts),
             evidence,
+        )
+
+    def denying(self, texts: Tensor) -> "NameBank":
+        """The same with more texts (M, C) that are true of nothing, behind the classes and the names."""
+        shape = (*self.against.shape[:2], len(texts))
+        return replace(
+            self,
+            vectors=torch.cat((self.vectors, texts)),
+            classes=torch.cat((self.classes, texts)),
+            against=torch.cat((self.against, torch.ones(shape, dtype=torch.bool)), 2),
         )
 
     def heard(self, said: Tensor) -> tuple[Tensor, Tensor] | None:

@@ -19,7 +19,7 @@ from langflash_core.lab.training.live import LivePhotos, pictures
 from langflash_core.lab.training.loop import LoopOptions, Optimising, train_stage
 from langflash_core.lab.training.pool import WHOLE, PhotoPool, PhotoSet, labelled_share
 from langflash_core.lab.training.real import MODULES, KeptPhotos, PhotoTargets
-from langflash_core.lab.training.second import KeptPixels, PixelSet, RoomPixels, second_stage
+from langflash_core.lab.training.second import KeptPixels, PixelSet, room_pixels, second_stage
 from langflash_core.lab.training.stages.stage import Words, guided
 from langflash_core.lab.training.states import LoopState, save_cut
 from langflash_core.lab.training.words import PhraseSampler, PhraseTable
@@ -127,12 +127,13 @@ def train_second(
     network: LangFlashNet,
     photos: PhotoPool,
     kept: PhotoPool | None,
-    rooms: RoomSet | None,
+    rooms: RoomSet,
     table: PhraseTable,
     run_dir: Path,
     options: LoopOptions,
 ) -> LoopState:
-    """Train what reads the second network's maps, from nothing, judged by `kept`: `RUN/second.pt`.
+    """Train what reads the second network's maps, from nothing, judged by `kept`: `RUN/second.pt`. rooms: it
+    learns to tell them from photos.
 
     Raises:
         InputError: a photo cannot be used, or they teach nothing.
@@ -140,10 +141,10 @@ def train_second(
     net = guided(network)
     with torch.random.fork_rng(devices=()):
         torch.manual_seed(options.seed)
-        net.second_head.reset_parameters()
+        net.second_head.begin()
     words = Words(PhraseSampler(table), torch.Generator().manual_seed(options.seed))
     net.deeplab.to(options.device)
-    seen = None if rooms is None else RoomPixels.of(net.deeplab, rooms, words)
+    seen = room_pixels(net.deeplab, rooms, words.generator)
     pixels = PixelSet.of(net.deeplab, photos, words.generator, seen)
     pixels.check()
     judge = None if kept is None else KeptPixels(PixelSet.of(net.deeplab, kept, words.generator), photos.bank)

@@ -1,15 +1,16 @@
 """The stage that learns what a second network's maps mean in the language space: `train second`.
 
 The network itself stays as it is, so that its maps of every photo are found once and pixels of all photos
-are drawn from them. One layer reads them and learns alone what they are called among the 37 classes, all
-names that the photos' sets have and the phrases of rendered rooms, as L(x) did, in the texts' own space.
-Whoever learned beside the first network, which knows the learned photos by heart, would be heard too little.
-Rendered rooms lose by it nevertheless (MEASURED.md).
+are drawn from them. One layer reads them and learns alone what they are called among the 37 classes and all
+names that the photos' sets have, and that none of them is "object", "things", "stuff" or "texture", which
+phrases are compared with. Whoever learned beside the first network, which knows the learned photos by heart,
+would be heard too little. Another layer learns to tell photos' pixels from those of rendered rooms, of which
+the second network knows nothing that the first does not.
 
 Sizes: P pixels, F channels of the maps, V views.
 
-Vectors as long as they like name a few more classes (.375 instead of .370 beside L(x)), but leave the texts'
-space: what is there is told from what is not less surely than without them (MEASURED.md).
+Vectors as long as they like, with attraction or without, and rooms' phrases beside them, were tried: they
+name as many classes, but other words less surely than without them (MEASURED.md).
 
 Source: adding log odds of two that err independently is Bayes' rule.
 """
@@ -27,12 +28,9 @@ from langflash_core.lab.training.bank import MIN_PHOTOS, NameBank
 from langflash_core.lab.training.batches import RoomSet
 from langflash_core.lab.training.fewlabels import class_loss, name_loss
 from langflash_core.lab.training.live import SIZES
-from langflash_core.lab.training.losses import language_loss
 from langflash_core.lab.training.measures import accuracy, confusion, mean_iou
 from langflash_core.lab.training.pool import WHOLE, PhotoPool, labelled_share
-from langflash_core.lab.training.shards import Label
-from langflash_core.lab.training.stages.language import phrase_bank
-from langflash_core.lab.training.stages.pixels import balanced_pixels, nearest
+from langflash_core.lab.training.stages.pixels import nearest
 from langflash_core.lab.training.stages.stage import Loss, Stage, Words, as_numbers, guided
 from langflash_core.network.encoders.deeplab import CHANNELS, DeepLab
 from langflash_core.network.guided import GuidedDepthNet
@@ -43,8 +41,8 @@ log = logging.getLogger(__name__)
 NAME = "second"
 """Of the stage, under which a run keeps it."""
 MODULES = ("second_head", "deeplab")
-NAMES, PHRASES = 0.5, 0.5
-"""What names, and phrases of rooms, count beside classes."""
+NAMES = 0.5
+"""What names count beside classes."""
 PIXELS = 1500
 """Named pixels of a photo, at most."""
 PARTLY_PIXELS = 150
@@ -57,48 +55,29 @@ GRID = 3.5
 """Pixels of a photo to one of the maps along a side: four to a patch, as L(x) has them."""
 
 
-@dataclass(frozen=True)
-class RoomPixels:
-    """Pixels of rendered rooms: maps (P, F); things (P,): which of the labels each shows."""
-
-    maps: Tensor
-    things: Tensor
-    labels: tuple[Label, ...]
-
-    @staticmethod
-    @torch.inference_mode()
-    def of(deeplab: DeepLab, rooms: RoomSet, words: Words) -> "RoomPixels":
-        """The second network looks at two views of every room once; pixels are drawn class-balanced."""
-        maps, things, at = [], [], {}
-        for room in rooms.walk(1, views=2):
-            labels = room.labels[0]
-            row_of = torch.tensor([at.setdefault(label, len(at)) for label in labels])
-            balance = words.sampler.balance(labels)
-            for image, ids in zip(room.images[0], room.instances[0], strict=True):
-                found = _maps(deeplab, image)
-                small = nearest(ids, (found.shape[-2], found.shape[-1]))
-                drawn = balanced_pixels(small, balance, ROOM_PIXELS, words.generator)
-                maps.append(found.flatten(1).T[drawn.to(found.device)].half().cpu())
-                things.append(row_of[small.flatten()[drawn]])
-        log.info("%d rooms looked at", len(rooms))
-        return RoomPixels(torch.cat(maps), torch.cat(things), tuple(at))
-
-    def draw(self, count: int, generator: torch.Generator) -> "RoomPixels":
-        """Some pixels."""
-        rows = torch.randint(len(self.things), (count,), generator=generator)
-        return RoomPixels(self.maps[rows], self.things[rows], self.labels)
+@torch.inference_mode()
+def room_pixels(deeplab: DeepLab, rooms: RoomSet, generator: torch.Generator) -> Tensor:
+    """Maps (P, F) of pixels of two views of every room, half precision."""
+    maps = []
+    for room in rooms.walk(1, views=2):
+        for image in room.images[0]:
+            found = _maps(deeplab, image).flatten(1).T
+            drawn = torch.randperm(len(found), generator=generator)[:ROOM_PIXELS]
+            maps.append(found[drawn.to(found.device)].half().cpu())
+    log.info("%d rooms looked at", len(rooms))
+    return torch.cat(maps)
 
 
 @dataclass(frozen=True)
 class PixelBatch:
     """maps (P, F); classes and names (P,) rows of a bank, -1 = none; sets (P,): which set each is of; rooms:
-    others of rooms, or None. Drawn, the first half has classes, the other names."""
+    maps (R, F) of pixels of rooms, where some are drawn. Then the first half has classes, the other names."""
 
     maps: Tensor
     classes: Tensor
     names: Tensor
     sets: Tensor
-    rooms: RoomPixels | None = None
+    rooms: Tensor | None = None
 
     @property
     def seeds(self) -> tuple[int | str, ...]:
@@ -106,10 +85,8 @@ class PixelBatch:
         return tuple(self.classes[:8].tolist())
 
     def to(self, device: str | torch.device) -> "PixelBatch":
-        rooms = self.rooms
-        if rooms is not None:
-            rooms = RoomPixels(rooms.maps.to(device).float(), rooms.things, rooms.labels)
         classes, names, sets = (part.to(device) for part in (self.classes, self.names, self.sets))
+        rooms = None if self.rooms is None else self.rooms.to(device).float()
         return PixelBatch(self.maps.to(device).float(), classes, names, sets, rooms)
 
     def at(self, rows: Tensor | slice) -> "PixelBatch":
@@ -118,10 +95,10 @@ class PixelBatch:
 
 
 class PixelSet:
-    """Named pixels of all photos, from which those of a step are drawn; maps in half precision, 512 bytes
-    each."""
+    """Named pixels of all photos, from which those of a step are drawn, and pixels of rooms (R, F), unnamed;
+    maps in half precision, 512 bytes each."""
 
-    def __init__(self, table: PixelBatch, rooms: RoomPixels | None = None):
+    def __init__(self, table: PixelBatch, rooms: Tensor | None = None):
         self.table, self.rooms = table, rooms
         self._classed = (table.classes >= 0).nonzero()[:, 0]
         counts = torch.bincount(table.names.clamp_min(-1) + 1)[1:]
@@ -132,7 +109,7 @@ class PixelSet:
     @staticmethod
     @torch.inference_mode()
     def of(
-        deeplab: DeepLab, pool: PhotoPool, generator: torch.Generator, rooms: RoomPixels | None = None
+        deeplab: DeepLab, pool: PhotoPool, generator: torch.Generator, rooms: Tensor | None = None
     ) -> "PixelSet":
         """The second network looks at every photo once, as it is.
 
@@ -183,7 +160,9 @@ class PixelSet:
         inside = (torch.rand(each, generator=generator) * self._counts[name]).long()
         by_name = self._by_name[self._starts[name] + inside]
         drawn = self.table.at(torch.cat((by_class, by_name)))
-        return drawn if self.rooms is None else replace(drawn, rooms=self.rooms.draw(each, generator))
+        if self.rooms is None:
+            return drawn
+        return replace(drawn, rooms=self.rooms[torch.randint(len(self.rooms), (each,), generator=generator)])
 
 
 @dataclass(frozen=True)
@@ -196,7 +175,7 @@ class KeptPixels:
     @torch.inference_mode()
     def __call__(self, network: LangFlashNet) -> dict[str, float]:
         head, table = guided(network).second_head, self.pixels.table
-        texts, device = self.bank.classes, head.weight.device
+        texts, device = self.bank.classes, head.words.weight.device
         said = [
             (head(maps.to(device).float()).cpu() @ texts.T).argmax(-1) for maps in table.maps.split(100_000)
         ]
@@ -205,33 +184,32 @@ class KeptPixels:
 
 
 def second_stage(bank: NameBank) -> Stage:
-    """The layer that reads the second network, which itself learns nothing."""
-    return Stage(
-        NAME, MODULES, (), {1: 1.0}, 8, 2e-3,
-        lambda network, batch, words: _loss(guided(network), batch, words, bank), rates={"deeplab": 0.0},
-    )  # fmt: skip
+    """The layers that read the second network, which itself learns nothing. What phrases are compared with
+    is true of no pixel."""
+
+    def loss(network: LangFlashNet, batch: PixelBatch, words: Words) -> Loss:
+        table = words.sampler.table
+        return _loss(guided(network), batch, bank.denying(table.embeddings[table.baseline_rows()]))
+
+    return Stage(NAME, MODULES, (), {1: 1.0}, 8, 2e-3, loss, rates={"deeplab": 0.0})
 
 
-def _loss(network: GuidedDepthNet, batch: PixelBatch, words: Words, bank: NameBank) -> Loss:
+def _loss(network: GuidedDepthNet, batch: PixelBatch, bank: NameBank) -> Loss:
     head, half = network.second_head, len(batch.classes) // 2
     units = head(batch.maps).float()
     by_class = class_loss(units[:half], batch.classes[:half], bank)
     by_name = name_loss(units[half:], batch.names[half:], batch.sets[half:], bank)
-    total = by_class + NAMES * by_name
+    total, told = by_class + NAMES * by_name, as_numbers(classes=by_class, names=by_name)
     if batch.rooms is None:
-        return Loss(total, as_numbers(classes=by_class, names=by_name))
-    by_phrase = _phrase_loss(head(batch.rooms.maps).float(), batch.rooms, words)
-    return Loss(total + PHRASES * by_phrase, as_numbers(classes=by_class, names=by_name, phrases=by_phrase))
+        return Loss(total, told)
+    apart = _photo_loss(head.photo_odds(batch.maps).float(), head.photo_odds(batch.rooms).float())
+    return Loss(total + apart, told | as_numbers(photos=apart))
 
 
-def _phrase_loss(units: Tensor, rooms: RoomPixels, words: Words) -> Tensor:
-    sampler, texts = words.sampler, words.sampler.table.embeddings.to(units)
-    said = sampler.draw([rooms.labels[thing] for thing in rooms.things.tolist()], words.generator)
-    bank = phrase_bank(said, words)
-    true = sampler.true(rooms.labels)[:, bank][rooms.things]
-    return language_loss(
-        units, texts[said.to(units.device)], texts[bank.to(units.device)], true=true.to(units.device)
-    )
+def _photo_loss(photos: Tensor, rooms: Tensor) -> Tensor:
+    """Cross-entropy of log odds of pixels of both kinds, as if there were as many of each: whoever looks at a
+    scene expects neither."""
+    return (F.softplus(-photos).mean() + F.softplus(rooms).mean()) / 2
 
 
 def _maps(deeplab: DeepLab, image: Tensor) -> Tensor:

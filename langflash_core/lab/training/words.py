@@ -46,8 +46,12 @@ class PhraseTable:
 
     def standing_rows(self) -> Tensor:
         """Rows that are negatives in every batch: class groups and `BASELINES`."""
+        return torch.cat((self.group_rows(), self.baseline_rows()))
+
+    def baseline_rows(self) -> Tensor:
+        """Rows of `BASELINES`."""
         rows = self.index()
-        return torch.cat((self.group_rows(), torch.tensor([rows[phrase] for phrase in BASELINES])))
+        return torch.tensor([rows[phrase] for phrase in BASELINES])
 
 
 def names_of(label: Label) -> tuple[str, str, tuple[str, ...]]:

@@ -2,11 +2,14 @@
 
 It sees photos with other eyes (`encoders.deeplab`), so that it errs elsewhere. One layer reads its maps and
 learned alone what they mean (`lab/training/second.py`): log odds of words are inner products with texts, as
-those of L(x) are. Their sum is that of both together, as far as they err independently (Bayes). The shipped
-weights hold no such layer: photos gain by it, but rendered rooms and other words lose (MEASURED.md).
+those of L(x) are. Their sum is that of both together, as far as they err independently (Bayes). It knows
+photos and is lost in rendered rooms, which look like nothing it learned from: another layer tells the two
+apart, and it is heard as far as a scene looks like photos.
 
-Sizes: V views, K parts, h w a map's own size, C channels of the language space.
+Sizes: V views, K parts, P pixels, h w a map's own size, C channels of the language space.
 """
+
+import math
 
 from jaxtyping import Float
 from torch import Tensor, nn
@@ -17,25 +20,44 @@ from langflash_core.network.presets import GuidedDepth
 
 COUNTS = 1.0
 """What the second network counts beside an atom, whose length is 1; its own is as long as its pixels agree.
-More names photos better still and rendered rooms worse (MEASURED.md)."""
+More names photos' classes better still and fewer other words (MEASURED.md)."""
+STEEPNESS = 10.0
+"""Of what tells photos from rooms, so that it learns as fast as the words do: channels that tell them apart
+are many and faint."""
+TOGETHER = 2.0
+"""A scene's pixels tell together what they show this much more surely than each alone."""
+PHOTOS = 3.0
+"""Scenes of photos for one of rendered pictures, before anything was seen."""
 
 
-class SecondHead(nn.Linear):
-    """Maps of `DeepLab` -> unit vectors of the language space. Zeros: it has learned nothing and is not
-    asked."""
+class SecondHead(nn.Module):
+    """Maps of `DeepLab` -> unit vectors of the language space, and how much they look like photos. Zeros: it
+    has learned nothing and is not asked."""
 
     def __init__(self, preset: GuidedDepth):
-        super().__init__(CHANNELS, preset.language_dim)
-        nn.init.zeros_(self.weight)
-        nn.init.zeros_(self.bias)
+        super().__init__()
+        self.words = nn.Linear(CHANNELS, preset.language_dim)
+        self.photo = nn.Linear(CHANNELS, 1)
+        for value in self.parameters():
+            nn.init.zeros_(value)
 
-    def forward(self, input: Float[Tensor, "... 256"]) -> Float[Tensor, "... C"]:
-        return F.normalize(super().forward(input), dim=-1)
+    def begin(self) -> None:
+        """Words as a layer begins to learn, so that no vector is zero; nothing is known of photos."""
+        self.words.reset_parameters()
+        nn.init.zeros_(self.photo.weight)
+        nn.init.zeros_(self.photo.bias)
+
+    def forward(self, maps: Float[Tensor, "... 256"]) -> Float[Tensor, "... C"]:
+        return F.normalize(self.words(maps), dim=-1)
+
+    def photo_odds(self, maps: Float[Tensor, "... 256"]) -> Float[Tensor, "..."]:
+        """Log odds that pixels are a photo's, not a rendered room's."""
+        return STEEPNESS * self.photo(maps)[..., 0]
 
     @property
     def silent(self) -> bool:
         """Whether it has learned nothing."""
-        return not bool(self.weight.any())
+        return not bool(self.words.weight.any())
 
 
 def looked_at(
@@ -44,19 +66,23 @@ def looked_at(
     images: Float[Tensor, "V 3 H W"],
     weights: Float[Tensor, "V K h w"],
 ) -> Float[Tensor, "K C"]:
-    """Means over every part of what the second network says, length 0 to 1, (K, C).
+    """Means over every part of what the second network says, times how surely these are photos: length 0 to
+    1, (K, C).
 
     View by view: a processor's caches hold one.
 
     Args:
         images: (V, 3, H, W) in [0, 1]. weights: w_k(x) of one scene, (V, K, h, w), any size.
     """
-    total = weights.new_zeros(weights.shape[1], head.out_features)
+    total = weights.new_zeros(weights.shape[1], head.words.out_features)
+    odds = weights.new_zeros(())
     size = (weights.shape[-2], weights.shape[-1])
     for image, own in zip(images.split(1), weights, strict=True):
-        maps = F.interpolate(deeplab(image), size, mode="bilinear", align_corners=False)[0]
-        total = total + own.flatten(1) @ head(maps.flatten(1).T)
-    return total / (weights.sum((0, 2, 3))[:, None] + 1e-6)
+        maps = F.interpolate(deeplab(image), size, mode="bilinear", align_corners=False)[0].flatten(1).T
+        total = total + own.flatten(1) @ head(maps)
+        odds = odds + head.photo_odds(maps).mean() / len(images)
+    means = total / (weights.sum((0, 2, 3))[:, None] + 1e-6)
+    return (TOGETHER * odds + math.log(PHOTOS)).sigmoid() * means
 
 
 def both(first: Float[Tensor, "K C"], second: Float[Tensor, "K C"]) -> Float[Tensor, "K C"]:

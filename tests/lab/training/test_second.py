@@ -1,7 +1,5 @@
 """Learning what a second network's maps mean: pixels that are drawn, that it learns, that a run keeps it."""
 
-import math
-
 import pytest
 import torch
 
@@ -16,7 +14,7 @@ from langflash_core.lab.training.second import (
     KeptPixels,
     PixelBatch,
     PixelSet,
-    RoomPixels,
+    room_pixels,
     second_stage,
 )
 from langflash_core.lab.training.shards import Label
@@ -62,7 +60,7 @@ def test_photos_without_names_are_left_and_partly_named_ones_give_less(learned, 
 
 
 def test_what_is_seen_lies_under_what_it_is_called(pixels, network):
-    """The layers are random, but some channel has another mean over red than over blue, by a half of what
+    """The layers are random, but some channel has another mean over red than over blue, by more than what
     it changes within both; labels of other pixels would leave nothing of it."""
     table = pixels.table
     red, blue = (table.maps[table.classes == row].float() for row in (WALL, CHAIR))
@@ -70,7 +68,7 @@ def test_what_is_seen_lies_under_what_it_is_called(pixels, network):
     mixed = table.maps[torch.randperm(len(table.maps), generator=torch.Generator().manual_seed(0))].float()
     other, rest = mixed[: len(red)], mixed[len(red) :]
     chance = (other.mean(0) - rest.mean(0)).abs() / (other.std(0) + rest.std(0) + 1e-6)
-    assert float(apart.max()) > 0.5 > 5 * float(chance.max())
+    assert float(apart.max()) > 5 * float(chance.max())
 
 
 def test_classes_come_as_they_are_and_names_alike():
@@ -86,41 +84,47 @@ def test_classes_come_as_they_are_and_names_alike():
     assert float((drawn.names[half:] == 7).float().mean()) == pytest.approx(0.5, abs=0.028)
 
 
-def test_rooms_teach_their_phrases(network, learned, pixels, rooms, words):
-    """Of the toy rooms' pixels, each thing has a share; after 150 steps they answer to their phrases."""
-    seen = RoomPixels.of(network.deeplab, rooms, words)
-    assert {label.group for label in seen.labels} == {"wall", "floor", "sofa", "table"}
-    assert len(seen.maps) == len(seen.things) == 4 * 2 * ROOM_PIXELS
-    assert float(torch.bincount(seen.things).float().min()) > 0.1 * len(seen.things)
+def test_photos_and_rooms_are_told_apart_and_what_is_denied_is_unsaid(network, learned, pixels, rooms, words):
+    """After 200 steps on both. Layers are random and tell colours and edges alone, so that some pixels are
+    never told apart; a coin is right of a half, and what has learned nothing of no pixel."""
+    seen = room_pixels(network.deeplab, rooms, words.generator)
+    assert seen.shape == (4 * 2 * ROOM_PIXELS, pixels.table.maps.shape[1])
     head, stage = network.second_head, second_stage(learned.bank)
     with torch.random.fork_rng():
         torch.manual_seed(0)
-        head.reset_parameters()
+        head.begin()
     both = PixelSet(pixels.table, seen)
     optimiser = torch.optim.Adam(head.parameters(), 0.01)
-    first = last = 0.0
-    for step in range(150):
-        loss = stage.loss(network, both.draw(1, 1, words.generator).to("cpu"), words)
+    for _ in range(200):
+        batch = both.draw(1, 1, words.generator).to("cpu")
+        assert batch.rooms is not None and len(batch.rooms) == DRAWN // 2
+        loss = stage.loss(network, batch, words)
         optimiser.zero_grad()
         loss.total.backward()
         optimiser.step()
-        first, last = (loss.parts["phrases"] if step == 0 else first), loss.parts["phrases"]
-    # Random layers tell colours and edges alone, so that it falls slowly, but by much more than it jumps.
-    assert math.isfinite(last) and last < 0.8 * first
+    with torch.no_grad():
+        photo, room = head.photo_odds(pixels.table.maps.float()), head.photo_odds(seen.float())
+        said = head(pixels.table.maps.float())
+    assert float((photo > 0).float().mean()) > 0.75 < float((room < 0).float().mean())
+    table = words.sampler.table
+    own = (said * learned.bank.classes[pixels.table.classes]).sum(1)
+    nothing = (said @ table.embeddings[table.baseline_rows()].T).amax(1)
+    # Relevancy at 10 (LERF): more than e^2 to 1 against the nearest of what is true of nothing.
+    assert float((own - nothing > 0.2).float().mean()) > 0.75
 
 
-def test_it_learns_and_a_run_keeps_it(learned, network, pixels, tmp_path):
+def test_it_learns_and_a_run_keeps_it(learned, network, pixels, rooms, tmp_path):
     table = build_table([Label("wall", "wall"), Label("chair", "chair")], encode)
     options = LoopOptions(
-        minutes=5, max_steps=60, ema_decay=0.9, learning_rate=0.01, optimising=Optimising(warm_up=5)
+        minutes=5, max_steps=100, ema_decay=0.9, learning_rate=0.01, optimising=Optimising(warm_up=5)
     )
     judge = KeptPixels(pixels, learned.bank)
     torch.manual_seed(2)
-    network.second_head.reset_parameters()
+    network.second_head.begin()
     before, eyes = judge(network), network.deeplab.stem.weight.clone()
-    train_second(network, learned, None, None, table, tmp_path, options)
+    train_second(network, learned, None, rooms, table, tmp_path, options)
     after = judge(network)
-    assert before["classes_accuracy"] < 0.75 and after["classes_accuracy"] > 0.95
+    assert before["classes_accuracy"] < 0.5 and after["classes_accuracy"] > 0.75
     assert torch.equal(network.deeplab.stem.weight.cpu(), eyes), "the network itself learns nothing"
     torch.manual_seed(1)
     other = build_network(MINI)
