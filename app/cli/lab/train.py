@@ -20,6 +20,7 @@ from langflash_core.lab.photos.layouts import convert
 from langflash_core.lab.photos.reading import Source
 from langflash_core.lab.photos.writing import FolderWriter
 from langflash_core.lab.training.commands import (
+    PhotoRun,
     run_adopt,
     run_cache,
     run_find_parts,
@@ -157,12 +158,7 @@ def _late(args: Namespace, out: TextIO) -> None:
             "--names goes with --more and without --twice; name other sets of photos with --more"
         )
     with joined(args.device) as device:
-        state = run_late(
-            *_learned_from(args, folder, device),
-            twice=args.twice,
-            names=args.names,
-            **_besides(args),
-        )
+        state = run_late(_learned_from(args, folder, device), twice=args.twice, names=args.names)
         if leads():
             print(f"{args.output}: trained the late halves, {state.step} steps", file=out)
 
@@ -174,7 +170,7 @@ def _second(args: Namespace, out: TextIO) -> None:
         with optional_packages():
             weights = read_deeplab(args.weights)
     with joined(args.device) as device:
-        state = run_second(*_learned_from(args, folder, device), weights=weights, **_besides(args))
+        state = run_second(_learned_from(args, folder, device), weights=weights)
         if leads():
             print(f"{args.output}: trained what reads the second network, {state.step} steps", file=out)
 
@@ -189,14 +185,14 @@ def _labelled(args: Namespace) -> PhotoFolder:
     return folder
 
 
-def _learned_from(args: Namespace, folder: PhotoFolder, device: str) -> tuple[Any, ...]:
-    """What both `late` and `second` are given first."""
+def _learned_from(args: Namespace, folder: PhotoFolder, device: str) -> PhotoRun:
+    """What both `late` and `second` are given."""
     learned = chosen_ids(folder.ids, "train")
     kept = [id for id in folder.ids if id not in learned]
     options = replace(
         _options(args, args.minutes), device=device, **_faster(args), validate_s=min(300.0, 12 * args.minutes)
     )
-    return (
+    return PhotoRun(
         args.cache,
         folder,
         learned,
@@ -205,11 +201,9 @@ def _learned_from(args: Namespace, folder: PhotoFolder, device: str) -> tuple[An
         _start(args),
         language_space(PRESETS[args.preset].space).encode,
         options,
+        more=[open_folder(place) for place in args.more],
+        preset=args.preset,
     )
-
-
-def _besides(args: Namespace) -> dict[str, Any]:
-    return {"more": [open_folder(place) for place in args.more], "preset": args.preset}
 
 
 def _options(args: Namespace, minutes: float) -> LoopOptions:

@@ -7,7 +7,7 @@ training does not import the query stage.
 import logging
 import time
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import torch
@@ -189,89 +189,94 @@ def run_recipe(
     return network.eval()
 
 
-def run_late(
-    folder: Path,
-    photos: PhotoFolder,
-    ids: Sequence[str],
-    kept: Sequence[str],
-    run_dir: Path,
-    start: Path,
-    encode: Encode,
-    options: LoopOptions,
-    *,
-    more: Sequence[PhotoFolder] = (),
-    twice: bool = False,
-    names: bool = False,
-    preset: str = "mini",
-) -> LoopState:
+@dataclass(frozen=True)
+class PhotoRun:
+    """What learning from labelled photos is given, beside rooms.
+
+    cache: of rooms. ids: of the photos to learn from; kept: of those to judge by now and then. start: weights
+    file that the run begins with. more: other sets, labelled, in part or not at all.
+    """
+
+    cache: Path
+    photos: PhotoFolder
+    ids: Sequence[str]
+    kept: Sequence[str]
+    run_dir: Path
+    start: Path
+    encode: Encode
+    options: LoopOptions
+    more: Sequence[PhotoFolder] = ()
+    preset: str = "mini"
+
+    def rooms(self) -> RoomSet:
+        """Those to learn from.
+
+        Raises:
+            InputError: there are none.
+        """
+        return _open(self.cache / "train")
+
+    def network(self) -> LangFlashNet:
+        """What learns, as the run begins."""
+        network = initial_network(PRESETS[self.preset], self.start, self.options.seed)
+        begin(network, self.start, ())
+        return network
+
+    def sets(self) -> Sets:
+        return Sets.of(self.photos, self.ids, self.more, self.encode)
+
+    def phrases(self) -> PhraseTable:
+        return phrase_table(self.cache, self.encode)
+
+
+def run_late(given: PhotoRun, *, twice: bool = False, names: bool = False) -> LoopState:
     """Train the late halves, and the heads that read them, on labelled photos and the cached rooms.
 
+    With other sets the late halves go on from what the weights have instead of beginning anew (`fewlabels`).
+
     Args:
-        ids: of the photos to learn from. kept: of those to judge by now and then. start: weights file that
-            the run begins with. more: other sets, labelled, in part or not at all; with them the late halves
-            go on from what the weights have instead of beginning anew (`fewlabels`). twice: what the
-            weights say of mirrored and larger photos teaches them (`twice`), instead of their average. names:
-            nothing is learned of depth.
+        twice: what the weights say of mirrored and larger photos teaches them (`twice`), instead of their
+            average. names: nothing is learned of depth.
 
     Raises:
         InputError: no cache, or a photo cannot be used.
     """
-    rooms = _open(folder / "train")
-    network = initial_network(PRESETS[preset], start, options.seed)
-    begin(network, start, ())
-    if more:
-        sets, judge = Sets.of(photos, ids, more, encode), None
-        if kept:
-            judge = judge_of(photos, kept, encode, options.device)
+    photos, kept, encode, options = given.photos, given.kept, given.encode, given.options
+    rooms, network, table = given.rooms(), given.network(), given.phrases()
+    if given.more:
+        judge = judge_of(photos, kept, encode, options.device) if kept else None
         rooms.tokens = False  # of the frozen half alone, which is run with the others
-        table = phrase_table(folder, encode)
         if twice:
-            return train_twice(network, sets, rooms, table, run_dir, options, judge)
+            return train_twice(network, given.sets(), rooms, table, given.run_dir, options, judge)
         weights = NAMES_ALONE if names else None
-        return train_few(network, sets, rooms, table, run_dir, options, judge, weights)
-    live = LivePhotos(photos, ids)
-    words = Words(PhraseSampler(phrase_table(folder, encode)), torch.Generator().manual_seed(options.seed))
+        return train_few(network, given.sets(), rooms, table, given.run_dir, options, judge, weights)
+    live = LivePhotos(photos, given.ids)
+    words = Words(PhraseSampler(table), torch.Generator().manual_seed(options.seed))
     targets = PhotoTargets.of(photos, live, encode)
     check = KeptPhotos(LivePhotos(photos, kept), targets, options.device) if kept else None
-    return train_late(network, targets, JointSet(live, rooms), words, run_dir, options, check)
+    return train_late(network, targets, JointSet(live, rooms), words, given.run_dir, options, check)
 
 
-def run_second(
-    folder: Path,
-    photos: PhotoFolder,
-    ids: Sequence[str],
-    kept: Sequence[str],
-    run_dir: Path,
-    start: Path,
-    encode: Encode,
-    options: LoopOptions,
-    *,
-    more: Sequence[PhotoFolder] = (),
-    weights: Mapping[str, Tensor] | None = None,
-    preset: str = "mini",
-) -> LoopState:
+def run_second(given: PhotoRun, *, weights: Mapping[str, Tensor] | None = None) -> LoopState:
     """Train what reads the second network's maps, on labelled photos and the cached rooms.
 
     Args:
-        ids: of the photos to learn from. kept: of those to judge by now and then. start: weights file.
-            more: other sets that name something. weights: of the second network (`DeepLab`); None: those of
-            `start`.
+        weights: of the second network (`DeepLab`); None: those that the run begins with.
 
     Raises:
         InputError: no cache, no second network, or a photo cannot be used.
     """
-    rooms = _open(folder / "train")
+    rooms, network = given.rooms(), guided(given.network())
     rooms.tokens = False
-    network = guided(initial_network(PRESETS[preset], start, options.seed))
-    begin(network, start, ())
     if weights is not None:
         network.deeplab.load_state_dict(weights)
     if not bool(network.deeplab.stem.weight.any()):
-        raise InputError(f"{start} holds no second network; give one with --weights")
-    learned = Sets.of(photos, ids, more, encode).named()
-    judged = PhotoPool((PhotoSet.of(photos, kept, 1.0),), (0,), learned.bank) if kept else None
-    table = phrase_table(folder, encode)
-    return train_second(network, learned, judged, rooms, table, run_dir, options)
+        raise InputError(f"{given.start} holds no second network; give one with --weights")
+    learned = given.sets().named()
+    judged = (
+        PhotoPool((PhotoSet.of(given.photos, given.kept, 1.0),), (0,), learned.bank) if given.kept else None
+    )
+    return train_second(network, learned, judged, rooms, given.phrases(), given.run_dir, given.options)
 
 
 def _open(folder: Path, limit: int | None = None, *, photos: bool = False) -> RoomSet:
