@@ -85,7 +85,7 @@ def test_classes_come_as_they_are_and_names_alike():
 
 
 def test_photos_and_rooms_are_told_apart_and_what_is_denied_is_unsaid(network, learned, pixels, rooms, words):
-    """After 200 steps on both. Layers are random and tell colours and edges alone, so that some pixels are
+    """After 100 steps on both. Layers are random and tell colours and edges alone, so that some pixels are
     never told apart; a coin is right of a half, and what has learned nothing of no pixel."""
     seen = room_pixels(network.deeplab, rooms, words.generator)
     assert seen.shape == (4 * 2 * ROOM_PIXELS, pixels.table.maps.shape[1])
@@ -95,7 +95,7 @@ def test_photos_and_rooms_are_told_apart_and_what_is_denied_is_unsaid(network, l
         head.begin()
     both = PixelSet(pixels.table, seen)
     optimiser = torch.optim.Adam(head.parameters(), 0.01)
-    for _ in range(200):
+    for _ in range(100):
         batch = both.draw(1, 1, words.generator).to("cpu")
         assert batch.rooms is not None and len(batch.rooms) == DRAWN // 2
         loss = stage.loss(network, batch, words)
@@ -116,7 +116,7 @@ def test_photos_and_rooms_are_told_apart_and_what_is_denied_is_unsaid(network, l
 def test_it_learns_and_a_run_keeps_it(learned, network, pixels, rooms, tmp_path):
     table = build_table([Label("wall", "wall"), Label("chair", "chair")], encode)
     options = LoopOptions(
-        minutes=5, max_steps=100, ema_decay=0.9, learning_rate=0.01, optimising=Optimising(warm_up=5)
+        minutes=5, max_steps=60, ema_decay=0.9, learning_rate=0.01, optimising=Optimising(warm_up=5)
     )
     judge = KeptPixels(pixels, learned.bank)
     torch.manual_seed(2)
