@@ -148,7 +148,9 @@ def train_second(
     pixels = PixelSet.of(net.deeplab, photos, words.generator, seen)
     pixels.check()
     judge = None if kept is None else KeptPixels(PixelSet.of(net.deeplab, kept, words.generator), photos.bank)
-    return train_stage(net, second_stage(photos.bank), pixels, words, run_dir, options, judge)
+    # What phrases are compared with is true of no pixel.
+    stage = second_stage(photos.bank.denying(table.embeddings[table.baseline_rows()]))
+    return train_stage(net, stage, pixels, words, run_dir, options, judge)
 
 
 @torch.no_grad()

@@ -31,7 +31,7 @@ from langflash_core.lab.training.live import SIZES
 from langflash_core.lab.training.measures import accuracy, confusion, mean_iou
 from langflash_core.lab.training.pool import WHOLE, PhotoPool, labelled_share
 from langflash_core.lab.training.stages.pixels import nearest
-from langflash_core.lab.training.stages.stage import Loss, Stage, Words, as_numbers, guided
+from langflash_core.lab.training.stages.stage import Loss, Stage, as_numbers, guided
 from langflash_core.network.encoders.deeplab import CHANNELS, DeepLab
 from langflash_core.network.guided import GuidedDepthNet
 from langflash_core.network.model import LangFlashNet
@@ -184,14 +184,11 @@ class KeptPixels:
 
 
 def second_stage(bank: NameBank) -> Stage:
-    """The layers that read the second network, which itself learns nothing. What phrases are compared with
-    is true of no pixel."""
-
-    def loss(network: LangFlashNet, batch: PixelBatch, words: Words) -> Loss:
-        table = words.sampler.table
-        return _loss(guided(network), batch, bank.denying(table.embeddings[table.baseline_rows()]))
-
-    return Stage(NAME, MODULES, (), {1: 1.0}, 8, 2e-3, loss, rates={"deeplab": 0.0})
+    """The layers that read the second network, which itself learns nothing."""
+    return Stage(
+        NAME, MODULES, (), {1: 1.0}, 8, 2e-3,
+        lambda network, batch, words: _loss(guided(network), batch, bank), rates={"deeplab": 0.0},
+    )  # fmt: skip
 
 
 def _loss(network: GuidedDepthNet, batch: PixelBatch, bank: NameBank) -> Loss:

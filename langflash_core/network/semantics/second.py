@@ -6,7 +6,7 @@ those of L(x) are. Their sum is that of both together, as far as they err indepe
 photos and is lost in rendered rooms, which look like nothing it learned from: another layer tells the two
 apart, and it is heard as far as a scene looks like photos.
 
-Sizes: V views, K parts, P pixels, h w a map's own size, C channels of the language space.
+Sizes: V views, K parts, h w a map's own size, C channels of the language space.
 """
 
 import math
@@ -20,7 +20,7 @@ from langflash_core.network.presets import GuidedDepth
 
 COUNTS = 1.0
 """What the second network counts beside an atom, whose length is 1; its own is as long as its pixels agree.
-More names photos' classes better still and fewer other words (MEASURED.md)."""
+More names photos hardly better (MEASURED.md)."""
 STEEPNESS = 10.0
 """Of what tells photos from rooms, so that it learns as fast as the words do: channels that tell them apart
 are many and faint."""
