@@ -3,6 +3,7 @@ for, weights with the photo's borders, colours solved for. Composes stages; noth
 in shape.
 """
 
+import math
 import time
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -40,7 +41,8 @@ _RINGING = 0.3
 
 @dataclass(frozen=True)
 class Covered:
-    """A scene in its photos' own colours; the photos, where they say nothing, and their light."""
+    """A scene in its photos' own colours; the photos, all their light in [0, 1]; where they say nothing; and
+    the light of all."""
 
     scene: Scene
     photos: "_Photos"
@@ -91,6 +93,7 @@ def covered_scene(
         progress=lambda done: progress("elements", 0.1 + 0.3 * done),
     )
     timings = {**prediction.timings, "assembly": time.perf_counter() - start}
+    photos = _Photos(views, light.whole, grid)
     return Covered(scene.with_record(cost=Cost(timings)), photos, left, light)
 
 
@@ -98,8 +101,8 @@ def covered_scene(
 def coloured_scene(covered: Covered, progress: Progress = lambda stage, fraction: None) -> Scene:
     """The scene in the colours of all its photos, without what nobody sees; `progress` as `covered_scene`."""
     solving, left = time.perf_counter(), covered.left
-    silent = _Silent(covered.photos, left)
-    scene = _coloured(covered.scene, silent, lambda done: progress("colours", 0.4 + 0.5 * done))
+    silent, light = _Silent(covered.photos, left), covered.light
+    scene = _coloured(covered.scene, silent, light, lambda done: progress("colours", 0.4 + 0.5 * done))
     timings = {**scene.record.cost.timings, "colours": time.perf_counter() - solving}
     shares = _shares(left)
     said = (*scene.record.warnings, *([_LEFT_OUT.format(*_counted(shares))] if shares else []))
@@ -189,12 +192,18 @@ def _counted(left_out: dict[str, list[float]]) -> tuple[str, str]:
     return ("1 photo shows" if count == 1 else f"{count} photos show"), left_out_line(left_out)
 
 
-def _coloured(scene: Scene, photos: _Silent, progress: Callable[[float], None]) -> Scene:
-    """The scene in the colours that make its photos (3, h, w) again; its record says how near they come."""
+def _coloured(scene: Scene, photos: _Silent, light: Light, progress: Callable[[float], None]) -> Scene:
+    """The scene in the colours that make its photos (3, h, w) again; its record says how near they come.
+
+    What the brightest and the darkest photos show beyond black and white in the light of all is kept:
+    at their places it is seen (`scene.exposure`).
+    """
     judged = len(photos) >= _JUDGES
+    low, high = (ends.float() for ends in light.span)
+    start = sh_to_colour(scene.gaussians.sh, scene.gaussians.means)
     solved = solved_colours(
         scene.gaussians,
-        sh_to_colour(scene.gaussians.sh, scene.gaussians.means),
+        (start - low) / (high - low),
         [scene.camera(v, *photos.size(v)) for v in range(len(photos))],
         photos,
         owners=scene.view_ids,
@@ -203,10 +212,13 @@ def _coloured(scene: Scene, photos: _Silent, progress: Callable[[float], None]) 
         leave_out=judged,
         progress=progress,
     )
-    sh = colour_to_sh(solved.colours)[:, None]
+    sh = colour_to_sh(low + (high - low) * solved.colours)[:, None]
     if solved.slopes is not None:
-        sh = torch.cat((sh, slopes_to_sh(solved.slopes)), 1)
-    near = [round(after, 2) for _, after in solved.psnr]
+        sh = torch.cat((sh, slopes_to_sh((high - low) * solved.slopes)), 1)
+    own = light.whole.gains.square().mean(1).sqrt().tolist()  # what a photo's own step is there
+    near = [
+        round(after + 20 * math.log10(gain), 2) for (_, after), gain in zip(solved.psnr, own, strict=True)
+    ]
     bought = {**scene.record.detail, "rounds": ROUNDS, "photos_psnr_db": near}
     scene = replace(scene, gaussians=replace(scene.gaussians, sh=sh)).with_record(detail=bought)
     if not judged:

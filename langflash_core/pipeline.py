@@ -26,6 +26,7 @@ from langflash_core.reconstruction.stages import scene_of
 from langflash_core.reconstruction.wishes import Wishes
 from langflash_core.resources import asset_path
 from langflash_core.running import Progress, Run
+from langflash_core.scene.exposure import lit_camera
 from langflash_core.scene.tour import Note, Stop, read_tour
 from langflash_core.splat import render as render_reference
 from langflash_core.types import Camera, Frame, QueryResult, Scene
@@ -314,4 +315,4 @@ def _camera(scene: Scene, view: int, camera: Camera | None, size: tuple[int, int
         if not 0 <= view < scene.num_views:
             raise ViewError(f"there is no view {view}; the scene has views 0 to {scene.num_views - 1}")
         camera = scene.camera(view)
-    return camera if size is None else camera.resized(*size)
+    return lit_camera(scene, camera if size is None else camera.resized(*size))

@@ -44,7 +44,8 @@ class Camera:
     """One camera: `viewmat` (4, 4), `K` (3, 3) pixels, image size in pixels.
 
     A pinhole, unless it is `orthographic`: then its rays are parallel to its z axis, and its focal lengths
-    are pixels per scene unit, at any depth.
+    are pixels per scene unit, at any depth. `light` (2, 3): gains and offsets of red, green and blue; the
+    scene's colours y are shown as (y - offset) / gain; None: as they are.
     """
 
     viewmat: Float[Tensor, "4 4"]
@@ -52,6 +53,7 @@ class Camera:
     width: int
     height: int
     orthographic: bool = False
+    light: Float[Tensor, "2 3"] | None = None
 
     def resized(self, width: int, height: int) -> "Camera":
         """The same camera drawn at another size; the field of view is kept per axis."""

@@ -12,10 +12,11 @@ from langflash_core.fine import coloured_scene, covered_scene
 from langflash_core.images.views import source_pictures
 from langflash_core.scene.checks import check_scene
 from langflash_core.scene.detailed import assemble_detailed
+from langflash_core.scene.exposure import lit_camera
 from langflash_core.scene.light import Light
 from langflash_core.splat.colours import ROUNDS
 from langflash_core.splat.reference import render
-from langflash_core.types import Scene
+from langflash_core.types import Camera, Scene
 from tests.scene.photographed import GRID, Photographed, photographed, png
 
 NORMAL = DETAILS["normal"]
@@ -40,6 +41,11 @@ def difference(scene: Scene, view: int, photo: Tensor) -> float:
     """dB of the picture at a photo's place."""
     drawn = render(scene, scene.camera(view, photo.shape[-1], photo.shape[-2]), weight_maps=False).rgb
     return -10 * float((drawn.movedim(-1, 0) - photo).square().mean().log10())
+
+
+def shown(scene: Scene, camera: Camera) -> Tensor:
+    """(3, h, w)."""
+    return render(scene, camera, weight_maps=False).rgb.movedim(-1, 0).clamp(0, 1)
 
 
 def test_sources_are_the_photos(given):
@@ -99,6 +105,22 @@ def test_light_is_recorded_where_it_is_not_the_identity():
     offsets = torch.tensor(scene.record.light["offsets"])
     middle = gains * torch.tensor([0.6, 0.42])[:, None] + offsets  # the wall's grey in both
     assert torch.allclose(middle[0], middle[1], atol=0.03)  # half of the robust sum's sigma
+
+
+def test_pictures_at_the_photos_places_have_the_photos_light():
+    """Two photos, half a stop apart: what were white in the dark one is beyond white in the light of both.
+    Without the light of the place each picture is a quarter of a stop off."""
+    given = photographed(gains=(1.2, 0.84))
+    scene, light = made(given)
+    assert float(light.span[1].max()) > 1.05
+    for view, photo in enumerate(given.photos):
+        camera = scene.camera(view, photo.shape[-1], photo.shape[-2])
+        near, far = (
+            -10 * float((shown(scene, of) - photo.clamp(0, 1)).square().mean().log10())
+            for of in (lit_camera(scene, camera), camera)
+        )
+        assert near > far + 3
+        assert near == pytest.approx(scene.record.detail["photos_psnr_db"][view], abs=0.5)
 
 
 def test_a_view_without_a_place_leaves_no_trace():

@@ -201,4 +201,5 @@ class LiveScene:
 
 def _camera_key(camera: Camera) -> tuple:
     pose, K = (m.detach().cpu().double().numpy().tobytes() for m in (camera.viewmat, camera.K))
-    return pose, K, camera.width, camera.height, camera.orthographic
+    light = None if camera.light is None else camera.light.cpu().numpy().tobytes()
+    return pose, K, camera.width, camera.height, camera.orthographic, light

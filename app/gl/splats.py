@@ -19,6 +19,7 @@ from .vertices import Vertices
 
 TINTS = ((0.16, 0.56, 1.0), (1.0, 0.22, 0.20))  # colours of tint 1, selected, and tint 2, to be deleted
 TINTED = 0.75  # share of the tint; the rest and the shading stay, so that shapes can be seen
+_PLAIN = np.array([[1.0] * 3, [0.0] * 3])  # the light of a camera without one
 _WIDEST = 1e12  # scene units: wider Gaussians are flat over any view, and float32 squares end at 1e38
 
 
@@ -128,6 +129,7 @@ class SplatBuffers:
         viewmat = camera.viewmat.detach().cpu().double().numpy()
         K = camera.K.detach().cpu().double().numpy()
         eye = -viewmat[:3, :3].T @ viewmat[:3, 3]
+        gain, offset = _PLAIN if camera.light is None else camera.light.cpu().numpy()
         set_uniforms(
             program,
             viewmat=viewmat,
@@ -136,6 +138,8 @@ class SplatBuffers:
             pinhole=np.array([K[0, 0], K[1, 1], K[0, 2], K[1, 2]]),
             orthographic=int(camera.orthographic),
             image_size=(float(camera.width), float(camera.height)),
+            light_gain=gain,
+            light_offset=offset,
             tint_colours=np.array(TINTS),
         )
         self._transform(program, self._vertices.content, self.places)

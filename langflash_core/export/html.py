@@ -38,6 +38,7 @@ from langflash_core.files import write_atomically
 from langflash_core.geometry.cameras import invert_rigid
 from langflash_core.geometry.poses import from_view
 from langflash_core.graphics import shader_source
+from langflash_core.scene.exposure import FAR, HERE, median_distance
 from langflash_core.scene.tour import Stop, read_tour
 from langflash_core.scene.world import turn_of
 from langflash_core.types import Scene
@@ -220,6 +221,7 @@ def _encoded(scene: Scene, phrases: Phrases | None) -> tuple[dict, bytes]:
         "views": _views(scene, origin),
         "viewSize": list(scene.view_size),
         "down": _down(scene),
+        **_light(scene),
         **_tour(scene, origin.numpy()),
         **books,
     }
@@ -252,6 +254,13 @@ def _views(scene: Scene, origin: Tensor) -> list[dict]:
             }
         )
     return views
+
+
+def _light(scene: Scene) -> dict:
+    """What the light of a place is found by (`scene.exposure`); nothing of photos in one light."""
+    light = scene.record.light
+    told = {**light, "distance": median_distance(scene), "far": FAR, "here": HERE}
+    return {"light": told} if light else {}
 
 
 def _down(scene: Scene) -> list[float]:

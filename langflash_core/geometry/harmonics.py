@@ -53,6 +53,11 @@ def sh_to_colour(sh: Float[Tensor, "N S 3"], directions: Float[Tensor, "N 3"]) -
     Directions point from the camera to the Gaussian. Degrees above 3 are kept in files but
     not shown, as in the field's renderers.
     """
+    return sh_to_signal(sh, directions).clamp_min(0)
+
+
+def sh_to_signal(sh: Float[Tensor, "N S 3"], directions: Float[Tensor, "N 3"]) -> Float[Tensor, "N 3"]:
+    """As `sh_to_colour`, not clamped."""
     degree = min(int(sh.shape[-2] ** 0.5) - 1, MAX_SHOWN_DEGREE)
     basis = sh_basis(directions, degree)
-    return (0.5 + torch.einsum("nb,nbc->nc", basis, sh[:, : basis.shape[-1]])).clamp_min(0)
+    return 0.5 + torch.einsum("nb,nbc->nc", basis, sh[:, : basis.shape[-1]])

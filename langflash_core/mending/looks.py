@@ -12,6 +12,7 @@ import torch
 from torch import Tensor
 
 from langflash_core.geometry.harmonics import colour_to_sh
+from langflash_core.scene.exposure import lit_camera
 from langflash_core.scene.gaps import filled
 from langflash_core.splat import drawable_rows, project, view_colours, view_depths
 from langflash_core.splat.tiles import rasterize_tiles
@@ -73,7 +74,7 @@ def before_and_after(scene: Scene, rows: Tensor, after: Scene | None, render: Re
         if each is None:
             continue
         frames = [
-            render(each, each.camera(view), weight_maps=False)
+            render(each, lit_camera(each, each.camera(view)), weight_maps=False)
             for view in range(min(scene.num_views, _MOST_VIEWS))
         ]
         columns.append(torch.cat([filled(frame.rgb.cpu(), frame.alphas.cpu()) for frame in frames]))

@@ -141,7 +141,7 @@ def _assembled(
             progress=told,
         )
         del prediction  # five megabytes a photo that nobody asks for any more
-        return coloured_scene(covered, told), covered.light.corrected(images).clamp(0, 1), lenses
+        return coloured_scene(covered, told), covered.light.corrected(images), lenses
 
 
 def _refined(wishes: Wishes, run: Run, scene: Scene, images: Float[Tensor, "V 3 H W"]) -> Scene:

@@ -83,6 +83,18 @@ class Light:
         plain = all(x == 1 for row in gains for x in row) and not any(x for row in offsets for x in row)
         return {} if plain else {"gains": gains, "offsets": offsets}
 
+    @property
+    def span(self) -> tuple[Float[Tensor, " 3"], Float[Tensor, " 3"]]:
+        """Least and most (3,) that photos in [0, 1] become, and 0 and 1: what no photo leaves."""
+        low = self.offsets.amin(0).clamp_max(0)
+        return low, (self.gains + self.offsets).amax(0).clamp_min(1)
+
+    @property
+    def whole(self) -> "Light":
+        """The same light with all its span in [0, 1], so that nothing of a photo is clipped."""
+        low, high = self.span
+        return Light(self.gains / (high - low), (self.offsets - low) / (high - low))
+
     def corrected(
         self, images: Float[Tensor, "*V 3 H W"], view: int | None = None
     ) -> Float[Tensor, "*V 3 H W"]:

@@ -22,7 +22,7 @@ from torch import Tensor
 from torch.nn.functional import normalize
 
 from langflash_core.geometry.cameras import transform
-from langflash_core.geometry.harmonics import sh_to_colour
+from langflash_core.geometry.harmonics import sh_to_signal
 from langflash_core.geometry.quaternions import quats_to_matrices
 from langflash_core.types import Camera, Gaussians, Scene
 
@@ -98,12 +98,19 @@ def view_depths(gaussians: Gaussians, camera: Camera) -> Float[Tensor, " N"]:
 
 
 def view_colours(gaussians: Gaussians, camera: Camera) -> Float[Tensor, "N 3"]:
-    """Colours (N, 3) as this camera sees them, clamped at 0, not above; parallel rays have its axis."""
+    """Colours (N, 3) as this camera sees them, in its light, clamped at 0, not above; parallel rays have its
+    axis."""
     viewmat = camera.viewmat.to(gaussians.means)
     if camera.orthographic:
-        return sh_to_colour(gaussians.sh, viewmat[2, :3].expand_as(gaussians.means))
-    position = -viewmat[:3, :3].T @ viewmat[:3, 3]
-    return sh_to_colour(gaussians.sh, normalize(gaussians.means - position, dim=-1))
+        directions = viewmat[2, :3].expand_as(gaussians.means)
+    else:
+        position = -viewmat[:3, :3].T @ viewmat[:3, 3]
+        directions = normalize(gaussians.means - position, dim=-1)
+    signal = sh_to_signal(gaussians.sh, directions)
+    if camera.light is not None:
+        gains, offsets = camera.light.to(signal)
+        signal = (signal - offsets) / gains
+    return signal.clamp_min(0)
 
 
 def project(gaussians: Gaussians, camera: Camera, near: float = NEAR) -> Footprints:

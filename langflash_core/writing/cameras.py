@@ -14,6 +14,7 @@ from langflash_core.files import readable_file
 from langflash_core.formats import LARGEST_SIDE
 from langflash_core.geometry.reach import median_reach
 from langflash_core.limits import TEXT
+from langflash_core.scene.exposure import lit_camera
 from langflash_core.types import Camera, Scene
 
 # |R R^T - 1| per entry: rotations written by hand carry four or five decimals.
@@ -43,7 +44,7 @@ class CameraChoice:
         """
         if self.described is not None:
             camera = self.described if self.size is None else self.described.resized(*self.size)
-            return self._by_rays(camera, scene)
+            return lit_camera(scene, self._by_rays(camera, scene))
         return self.of_photo(scene, self.view or 0)
 
     def of_photo(self, scene: Scene, view: int) -> Camera:
@@ -57,7 +58,7 @@ class CameraChoice:
                 f"there is no view {view}: this scene has {scene.num_views}, counted from 0; "
                 f"use --view 0{_last(scene.num_views)}"
             )
-        return self._by_rays(scene.camera(view, *(self.size or (None, None))), scene)
+        return lit_camera(scene, self._by_rays(scene.camera(view, *(self.size or (None, None))), scene))
 
     def _by_rays(self, camera: Camera, scene: Scene) -> Camera:
         if not self.ortho or camera.orthographic:

@@ -36,6 +36,7 @@ from langflash_core.language.relevance import CompiledQuery, compile_query
 from langflash_core.language.spaces import language_space
 from langflash_core.limits import TEXT
 from langflash_core.running import Progress
+from langflash_core.scene.exposure import lit_camera
 from langflash_core.scene.tour import read_tour
 from langflash_core.scene.world import turn_of
 from langflash_core.types import NO_LANGUAGE, Camera, Scene
@@ -174,7 +175,8 @@ def picture(
     heat: CompiledQuery | None,
     colours: HeatColours = USUAL,
 ) -> np.ndarray:
-    """(H, W, 3) uint8."""
+    """(H, W, 3) uint8, in the light of the place."""
+    camera = lit_camera(scene, camera)
     if heat is None:
         return renderer.colours(scene, camera)
     frame, relevance = renderer.answered(scene, camera, heat)

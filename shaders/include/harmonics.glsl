@@ -1,4 +1,4 @@
-// Purpose: colour of spherical harmonics up to degree 3; twin of langflash_core/geometry/harmonics.py.
+// Purpose: colour of spherical harmonics up to degree 3, not clamped; twin of langflash_core/geometry/harmonics.py.
 // Source: constants and signs of Kerbl et al. 2023.
 // Frames: direction from the camera to the Gaussian, world, unit. SH_DEGREE is set by the program; who includes
 //         this says before where coefficients are: vec3 coefficient(int base).
@@ -24,5 +24,5 @@ vec3 sh_colour(vec3 direction) {
         + 1.445305721320277 * z * (xx - yy) * coefficient(14)
         - 0.5900435899266435 * x * (xx - 3.0 * yy) * coefficient(15);
 #endif
-    return max(colour, 0.0);
+    return colour;
 }

@@ -36,6 +36,8 @@ uniform vec3 eye_rest;     // scenes far from their origin lose no digits
 uniform vec4 pinhole;      // fx, fy, cx, cy in pixels; of an orthographic camera fx, fy are pixels per unit
 uniform bool orthographic;
 uniform vec2 image_size;   // pixels
+uniform vec3 light_gain;    // the scene's colours y are shown as (y - offset) / gain
+uniform vec3 light_offset;
 uniform vec3 tint_colours[2];
 
 out vec4 out_place;   // centre (pixels), opacity, z-depth
@@ -54,7 +56,7 @@ void main() {
     out_place = vec4(centre * pinhole.xy + pinhole.zw, in_mean.w, pos_c.z);
     out_shape = vec4(root, RADIUS);
     vec3 direction = orthographic ? transpose(mat3(viewmat))[2] : normalize(from_eye);
-    out_colour = min(sh_colour(direction), HALF_MAX);
+    out_colour = clamp((sh_colour(direction) - light_offset) / light_gain, 0.0, HALF_MAX);
     int tint = int(255.0 * in_tint + 0.5);
     if (tint > 0) {
         float grey = luma(min(out_colour, 1.0));

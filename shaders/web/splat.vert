@@ -19,6 +19,8 @@ uniform mat3 turn;             // world to camera
 uniform vec3 eye;              // world
 uniform vec4 pinhole;          // fx, fy, cx, cy in pixels
 uniform vec2 image_size;       // pixels
+uniform vec3 light_gain;       // the scene's colours y are shown as (y - offset) / gain
+uniform vec3 light_offset;
 
 flat out vec2 centre;
 flat out vec4 whitening;
@@ -61,7 +63,7 @@ void main() {
     vec3 root = footprint_root(pos_c, turn * axes_w, pinhole, image_size);
     entry = int(scale.w);
     plain = texel_of(gaussians, first + 3).rgb;
-    colour = sh_colour(normalize(from_eye));
+    colour = max((sh_colour(normalize(from_eye)) - light_offset) / light_gain, 0.0);
 
     centre = pos_c.xy / pos_c.z * pinhole.xy + pinhole.zw;
     whitening = vec4(1.0 / root.x, root.y, 1.0 / root.z, mean.w);

@@ -23,6 +23,7 @@ from langflash_core.language.answers import COVERED_ALPHA
 from langflash_core.language.spaces import language_space
 from langflash_core.resources import asset_path
 from langflash_core.scene.bare import bare_scene
+from langflash_core.scene.exposure import lit_camera
 from langflash_core.splat import render
 from langflash_core.types import QueryResult, Scene
 from tests.app.window.scenes import CHAIR, PHRASES, room
@@ -249,6 +250,35 @@ def test_gloss_is_drawn(page, tmp_path):
     ours = render(shiny, shiny.camera(0, 480, 400), weight_maps=False)
     assert decibels(drawn(page, 0, (480, 400)).rgb, ours.rgb.numpy()) >= LEAST_DB
     assert page.value("document.getElementById('ask').hidden") is True
+    assert page.errors == []
+
+
+def test_photos_are_shown_in_their_own_light(page, tmp_path):
+    """At their places, and between them."""
+    some = cloud(800, num_atoms=0, degree=1, dtype=torch.float32)
+    gaussians = replace(some.gaussians, quats=normalize(some.gaussians.quats, dim=-1))
+    viewmats = some.viewmats[:1].repeat(2, 1, 1)
+    viewmats[1, 0, 3] += 0.2
+    photos = replace(some, gaussians=gaussians, viewmats=viewmats, Ks=some.Ks[:1].repeat(2, 1, 1))
+    light = {"gains": [[1.5, 1.4, 1.3], [0.7, 0.6, 0.8]], "offsets": [[0.1, 0.0, 0.1], [-0.2, -0.1, 0.0]]}
+    photos = photos.with_record(light=light)
+    write_html(photos, tmp_path / "lit.html")
+    page.open(tmp_path / "lit.html", (480, 400))
+    page.value(_READY)
+    for view in (0, 1):
+        plain = photos.camera(view, 480, 400)
+        ours, other = (
+            render(photos, of, weight_maps=False).rgb.numpy() for of in (lit_camera(photos, plain), plain)
+        )
+        theirs = drawn(page, view, (480, 400)).rgb
+        assert decibels(theirs, ours) >= LEAST_DB > decibels(theirs, other) + 5
+    between = photos.viewmats[0].clone()
+    between[0, 3] += 0.1
+    camera = lit_camera(photos, replace(photos.camera(0), viewmat=between))
+    eye = (photos.viewmats[0, :3, :3].T @ (between[:3, 3] - photos.viewmats[0, :3, 3])).neg().tolist()
+    place = json.dumps({"eye": eye, "turn": between[:3, :3].tolist()})
+    told = page.value(f"langflash.then((page) => page.drawing.lightAt({place}))")
+    assert camera.light is not None and np.allclose(told, camera.light.numpy(), atol=1e-4)
     assert page.errors == []
 
 

@@ -6,6 +6,7 @@ from typing import TYPE_CHECKING
 from langflash_core.errors import WeightsError
 from langflash_core.files import readable_file
 from langflash_core.lab.evaluation.labelled import Render
+from langflash_core.scene.exposure import lit_camera
 from langflash_core.types import Camera, Frame, Scene
 from langflash_core.writing.renderers import Renderer
 
@@ -25,9 +26,9 @@ def opened_lpips(path: Path | None) -> "Lpips | None":
 
 
 def colour_only(renderer: Renderer) -> Render:
-    """A renderer without weight maps."""
+    """A renderer without weight maps, in the light of the place, as people see it."""
 
     def render(scene: Scene, camera: Camera) -> Frame:
-        return renderer(scene, camera, weight_maps=False)
+        return renderer(scene, lit_camera(scene, camera), weight_maps=False)
 
     return render

@@ -11,6 +11,7 @@ from typing import TYPE_CHECKING
 import torch
 
 from langflash_core.geometry.poses import to_camera
+from langflash_core.scene.exposure import lit_camera
 
 from ...gl.processor.artist import Artist, Stopping, Work
 from ...gl.processor.still import Still, draw_still
@@ -134,7 +135,8 @@ class Stills:
     def _drawing(self, name: Drawn, state: State) -> Work:
         """The work of a picture so named, for the thread; it gives the picture and seconds that it took."""
         width, height = (max(8, round(side * name.plan.scale)) for side in name.size)
-        camera, marked, scene = to_camera(name.pose, width, height), self._easel.marked, self._scene
+        marked, scene = self._easel.marked, self._scene
+        camera = lit_camera(scene, to_camera(name.pose, width, height))
         ask, maps = self._questions(state), name.plan.kind is Kind.MAPS
 
         def work(stopping: Stopping) -> tuple[Still, float]:

@@ -21,6 +21,25 @@ function turned(a, axis, angle) {
   );
 }
 
+// Gains and offsets of the light of a place, as langflash_core/scene/exposure.py has it: the photos' around it.
+function lightAt({ views, light }, { eye, turn }) {
+  if (!light)
+    return [
+      [1, 1, 1],
+      [0, 0, 0],
+    ];
+  const squares = views.map((view) => {
+    const chord = turn.reduce((sum, axis, row) => sum + length(plus(axis, view.turn[row], -1)) ** 2, 0);
+    const angle = 2 * Math.asin(Math.min(1, Math.sqrt(chord / 8)));
+    return angle ** 2 + (length(plus(eye, view.eye, -1)) / light.distance) ** 2;
+  });
+  const weights = squares.map((square) => 1 / (square + light.here ** 2));
+  const total = weights.reduce((sum, weight) => sum + weight, 1 / light.far ** 2);
+  const mean = (rows, of) =>
+    [0, 1, 2].map((channel) => weights.reduce((sum, w, v) => sum + w * of(rows[v][channel]), 0) / total);
+  return [mean(light.gains, Math.log).map(Math.exp), mean(light.offsets, (offset) => offset)];
+}
+
 // A lens for another size that shows the whole of the photo, and `more` times as much magnified.
 function fitted(lens, [width, height], more = 1) {
   const scale = more * Math.min(width / lens.size[0], height / lens.size[1]);

@@ -131,9 +131,17 @@ class Drawing {
     gl.uniform3fv(program.place("eye"), camera.eye);
     gl.uniform4fv(program.place("pinhole"), lens.pinhole);
     gl.uniform2fv(program.place("image_size"), lens.size);
+    const [gain, offset] = this.lightAt(camera);
+    gl.uniform3fv(program.place("light_gain"), gain);
+    gl.uniform3fv(program.place("light_offset"), offset);
     gl.bindVertexArray(this.quads);
     gl.drawElementsInstanced(gl.TRIANGLES, 6 * BATCH, gl.UNSIGNED_SHORT, 0, Math.ceil(count / BATCH));
     gl.disable(gl.BLEND);
+  }
+
+  // Gains and offsets of the light in which a camera shows the scene.
+  lightAt(camera) {
+    return lightAt(this.header, camera);
   }
 
   // Bring the Gaussians in the order of a camera to the graphics card; how many there are to draw.

@@ -59,6 +59,19 @@ def test_colour_depth_and_transmittance(gl, precision, degree):
     assert_agrees(frame, expected, precision)
 
 
+def test_colours_in_the_light_of_a_place(gl, precision):
+    """Another light is another picture, though nothing else of the camera changes."""
+    scene = cloud(1000, degree=1, dtype=torch.float32)
+    plain = camera(96, 80, 80.0, turned(0.15, (0.1, 0.0, 0.1)))
+    renderer = SplatRenderer(gl, precision)
+    renderer.set_scene(scene)
+    for light in (None, torch.tensor([[1.4, 1.2, 0.8], [0.2, -0.1, -0.3]]), None):
+        seen = dataclasses.replace(plain, light=light)
+        renderer.draw(seen)
+        assert_agrees(renderer.frame(weight_maps=True), render(scene, seen), precision)
+    renderer.release()
+
+
 @pytest.mark.parametrize("degree", [0, 3])
 def test_parallel_rays(gl, precision, degree):
     scene = cloud(2000, num_atoms=5, degree=degree, dtype=torch.float32)
