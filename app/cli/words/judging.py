@@ -317,6 +317,9 @@ def _add_walk(actions) -> None:
         "--memory", action="store_true", help="each scene in a process of its own, whose memory is told"
     )
     command.add_argument("--colmap", action="store_true", help="COLMAP's cameras beside; needs pycolmap")
+    command.add_argument(
+        "--seen-aside", action="store_true", help="also from aside, by the other photos of the folder"
+    )
     _add_fitting(command)
     command.add_argument(
         "--results",

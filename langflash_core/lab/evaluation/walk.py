@@ -14,7 +14,7 @@ Sizes: H W pixels; "large" is the photo's size, at most three times the network'
 
 import math
 from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 import torch
@@ -29,14 +29,16 @@ from langflash_core.lab.evaluation.sharp_subjects import size_of
 from langflash_core.lab.evaluation.side_measures import Similarity, as_array
 from langflash_core.lab.evaluation.sides import number
 from langflash_core.lab.evaluation.tallies import Shelf, collected
+from langflash_core.lab.evaluation.walk_aside import aside
 from langflash_core.lab.evaluation.walk_colmap import mapped
 from langflash_core.lab.evaluation.walk_measures import camera_errors, fitted_cameras, lit
-from langflash_core.lab.evaluation.walk_scenes import Bench, Made, files_of, made_of, true_cameras
+from langflash_core.lab.evaluation.walk_scenes import Bench, Made, files_of, made_of, true_cameras, with_lens
 from langflash_core.lab.evaluation.walk_subjects import Walk
 from langflash_core.lab.photos.fitting import FittedPhoto
 from langflash_core.lab.training.measures import abs_rel, align_scale, delta1, nan_mean, psnr
 from langflash_core.language.answers import COVERED_ALPHA
 from langflash_core.running import Progress
+from langflash_core.scene.gaps import filled
 from langflash_core.types import Camera, Scene
 
 ALONE = "alone_"
@@ -108,7 +110,11 @@ def judge(
     for photos, frames in sorted(plan.chosen.items()):
         progress(f"{photos} photos", done / sum(plan.chosen))
         made = made_of(walk, frames, bench, memory=bench.memory)
-        once = {**once_of(made, bench.render), **(_colmap(made, bench) if bench.colmap else {})}
+        once = {
+            **once_of(made, bench.render),
+            **(aside(made, walk, bench) if bench.aside else {}),
+            **(_colmap(made, bench) if bench.colmap else {}),
+        }
         kept: dict[str, dict[str, float]] = {}
         for frame in plan.between(photos):
             rgb, kept[str(frame)] = pictured_at(made, walk, frame, bench)
@@ -150,6 +156,7 @@ def once_of(made: Made, render: Render) -> dict[str, float]:
         **_cameras(as_array(scene.viewmats), true_cameras(placed), made.fit, made.length),
         "focal": abs(made.lens - 1),
         **{key: nan_mean(row[key] for row in depth) for key in depth[0]},
+        "own_psnr": nan_mean(_own_psnr(made, view, render) for view in range(len(placed))),
         "gaussians": float(len(scene.gaussians)),
         "coarse": float((scene.levels == 0).sum()) if scene.levels is not None else math.nan,
         "seconds": made.cost.seconds,
@@ -183,6 +190,15 @@ def _depth(scene: Scene, view: int, photo: FittedPhoto, fit: Similarity, render:
     }
 
 
+def _own_psnr(made: Made, view: int, render: Render) -> float:
+    """dB of a photo's own place, at the photo's size, as the window shows it."""
+    scene = made.scene
+    size = size_of(made.placed[view], scene.view_size)
+    frame = render(scene, scene.camera(view, *size))
+    shown = filled(frame.rgb.cpu().float(), frame.alphas.cpu().float()).clamp(0, 1)
+    return psnr(shown, _rgb(as_seen(made.placed[view], size)))
+
+
 def _colmap(made: Made, bench: Bench) -> dict[str, float]:
     """COLMAP's cameras of the same photos, and the scene's own where COLMAP has some, too."""
     with files_of(made.photos) as paths:
@@ -214,7 +230,7 @@ def pictured_at(made: Made, walk: Walk, frame: int, bench: Bench) -> tuple[Tenso
     """
     scene, target = made.scene, walk.kept(frame)
     sizes = (scene.view_size, size_of(target, scene.view_size))
-    small, large = (_through(made.lens, as_seen(target, size)) for size in sizes)
+    small, large = (with_lens(made.lens, as_seen(target, size)) for size in sizes)
     places = [torch.from_numpy(made.fit.viewmat(walk.camera(frame))).float()]
     if bench.align:
         places.append(_fitted_place(made, walk, frame, small, bench))
@@ -227,11 +243,6 @@ def pictured_at(made: Made, walk: Walk, frame: int, bench: Bench) -> tuple[Tenso
         if bench.align:
             numbers |= {f"{name}aligned_{key}": value for key, value in best.items()}
     return rgb, numbers
-
-
-def _through(lens: float, photo: FittedPhoto) -> FittedPhoto:
-    """With focal lengths that many times as long."""
-    return replace(photo, K=photo.K * torch.tensor([[lens, 1, 1], [1, lens, 1], [1, 1, 1]]).to(photo.K))
 
 
 def _fitted_place(made: Made, walk: Walk, frame: int, photo: FittedPhoto, bench: Bench) -> Tensor:

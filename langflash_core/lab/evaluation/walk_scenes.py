@@ -28,6 +28,7 @@ from langflash_core.lab.evaluation.stretches import placed_views
 from langflash_core.lab.evaluation.walk_measures import centres_of, fitted_cameras, lens_ratio, walked
 from langflash_core.lab.evaluation.walk_subjects import Walk
 from langflash_core.lab.photos import LabelledPhoto
+from langflash_core.lab.photos.fitting import FittedPhoto
 from langflash_core.pipeline import reconstruct
 from langflash_core.reconstruction.networks import Networks
 from langflash_core.scene.file import load, save
@@ -41,7 +42,8 @@ class Bench:
     render: draws one. weights, preset, size: as `reconstruct` has them. assume_lens: it is told nothing of
     the lens. given_poses: it is told where the photos were taken. alone: kept frames' own two photos stand
     beside. align: also from poses fitted to the pictures. lpips: None leaves it out. memory: each scene is
-    made in a process of its own, whose memory is told. colmap: its cameras stand beside.
+    made in a process of its own, whose memory is told. colmap: its cameras stand beside. aside: also from
+    aside, by photos of the same place.
     """
 
     render: Render
@@ -55,6 +57,7 @@ class Bench:
     lpips: Lpips | None = None
     memory: bool = False
     colmap: bool = False
+    aside: bool = False
     networks: Networks = field(default_factory=Networks, repr=False, compare=False)
 
 
@@ -134,6 +137,11 @@ def made_of(walk: Walk, frames: Sequence[int], bench: Bench, *, memory: bool = F
     return replace(made, fit=_scaled(made, bench.render)) if len(views) < 2 else made
 
 
+def with_lens(lens: float, photo: FittedPhoto) -> FittedPhoto:
+    """With focal lengths that many times as long."""
+    return replace(photo, K=photo.K * torch.tensor([[lens, 1, 1], [1, lens, 1], [1, 1, 1]]).to(photo.K))
+
+
 @contextmanager
 def files_of(photos: Sequence[LabelledPhoto]) -> Iterator[list[Path]]:
     """The photos as files of one folder, which goes."""
@@ -187,11 +195,11 @@ def true_cameras(photos: Sequence[LabelledPhoto]) -> Float[np.ndarray, "V 4 4"]:
 
 
 def _wordless(scene: Scene) -> Scene:
-    """The scene without language, which costs memory and time to draw."""
+    """The scene without language, which costs memory and time to draw; of its record what it is drawn by."""
     count = len(scene.gaussians)
     ids = torch.zeros(count, 0, dtype=torch.int64)
     nothing = Semantics(ids, torch.zeros(count, 0), torch.zeros(0, 0), NO_LANGUAGE)
-    return replace(scene, semantics=nothing, record=Record())
+    return replace(scene, semantics=nothing, record=Record(light=scene.record.light))
 
 
 def _scaled(made: Made, render: Render) -> Similarity:

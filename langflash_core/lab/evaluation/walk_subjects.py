@@ -104,13 +104,14 @@ def _evenly(values: Sequence[int], count: int) -> tuple[int, ...]:
 @dataclass(frozen=True)
 class Walk:
     """Frames by number. photo: as the camera took it; kept: the same place as a picture should show it;
-    camera: world to camera (4, 4)."""
+    camera: world to camera (4, 4). others: further photos of the place, that are no frames."""
 
     name: str
     plan: Plan
     photo: Callable[[int], LabelledPhoto]
     kept: Callable[[int], LabelledPhoto]
     camera: Callable[[int], Float[np.ndarray, "4 4"]]
+    others: Callable[[], Iterator[LabelledPhoto]] = lambda: iter(())
 
     @property
     def intrinsics(self) -> tuple[float, float, float, float] | None:
@@ -145,7 +146,10 @@ def posed_walks(folder: PhotoFolder, plan: Plan, count: int, step: int = 1) -> I
             assert folder.poses is not None
             return np.linalg.inv(folder.poses[names[frame]].double().numpy())
 
-        yield Walk(f"{names[0]}-{names[-1]}", plan, photo, photo, camera)
+        def others(names: list[str] = names) -> Iterator[LabelledPhoto]:
+            return (folder.photo(id) for id in ids if id not in names)
+
+        yield Walk(f"{names[0]}-{names[-1]}", plan, photo, photo, camera, others)
 
 
 @dataclass(frozen=True)

@@ -125,6 +125,7 @@ def test_weights_verify_notices_damage(run, checkpoint, tmp_path):
         (["eval", "walk", "gone.npz"], "no furniture pack at gone.npz"),
         (["eval", "walk", "p.npz", "--photos", "1"], "two photos or more"),
         (["eval", "walk", "--posed", ".", "--blur", "1"], "leave them out with --posed"),
+        (["eval", "walk", "p.npz", "--seen-aside"], "--seen-aside judges by other photos of a folder"),
         (["eval", "walk", "p.npz", "--sheet", "a.png"], "give --results, too"),
         (["eval", "walk", "p.npz", "-o", "table.txt"], "this command writes .md"),
         (["eval", "walk-beside", "gone", "gone"], "no result of eval walk at gone/walk.json"),

@@ -29,7 +29,7 @@ WALKS = "walks"
 """The folder of results that keeps single walks."""
 OPTIONS = (
     "size", "set", "way", "exposure", "blur", "step", "assume_lens", "given_poses", "no_own", "align",
-    "memory", "colmap", "depth_unit", "crop", "intrinsics", "passers", "screens",
+    "memory", "colmap", "seen_aside", "depth_unit", "crop", "intrinsics", "passers", "screens",
 )  # fmt: skip
 """By which numbers of a walk change."""
 
@@ -86,6 +86,10 @@ def _check(args: Namespace) -> None:
         raise InputError(
             "--exposure, --blur, --passers and --screens change drawn rooms; leave them out with --posed"
         )
+    if args.seen_aside and args.folder is None:
+        raise InputError(
+            "--seen-aside judges by other photos of a folder; give one with --posed, or leave it out"
+        )
     check_files(args)
     if args.results is not None:
         check_folder(args.results)
@@ -122,6 +126,7 @@ def _bench(args: Namespace, renderer: Renderer) -> "Bench":
         lpips=opened_lpips(args.lpips),
         memory=args.memory,
         colmap=args.colmap,
+        aside=args.seen_aside,
     )
 
 
