@@ -11,7 +11,7 @@ import numpy as np
 from langflash_core import pictures
 from langflash_core.geometry.poses import to_camera
 from langflash_core.pictures import Picture
-from langflash_core.scene.exposure import lit_camera
+from langflash_core.scene.exposure import PlaceLight
 
 from ...gl import SplatRenderer
 from ...gl.paints import PAINTS, Wanted
@@ -58,7 +58,7 @@ class Easel:
         renderer.canvas.forget()
         renderer.ask(None)
         self.renderer = renderer
-        self._scene = scene
+        self._light = PlaceLight.of(scene)
         self.drawn: Drawn | None = None
         self.camera: Camera | None = None
         self.seconds = 0.0
@@ -104,7 +104,7 @@ class Easel:
         """Draw that picture, by the renderer."""
         plan, renderer = wanted.plan, self.renderer
         width, height = (max(8, round(side * plan.scale)) for side in wanted.size)
-        self.camera = lit_camera(self._scene, to_camera(wanted.pose, width, height))
+        self.camera = self._light.lit(to_camera(wanted.pose, width, height))
         renderer.upload(plan.share)  # once, and no matter of what pictures cost
         start = time.perf_counter()
         self.drawn = None  # should it fail: what was drawn may have made room for it
