@@ -24,8 +24,8 @@ from langflash_core.geometry.cameras import invert_rigid
 from langflash_core.types import Camera, Scene
 
 FAR = 0.25
-"""Radians: so far from the only photo, a picture is half in its light. Of frames beside eight real photos .2 to .3
-are best (MEASURED, "The light of a place")."""
+"""Radians: so far from the only photo, a picture is half in its light. Beside eight real photos .2 to .3 are
+best (MEASURED, "The light of a place")."""
 HERE = 1e-4  # radians, within which a place is a photo's own
 _SAMPLES = 1000  # Gaussians that tell the median distance
 
