@@ -78,7 +78,7 @@ def covered_scene(
         views.images, prediction.depths, prediction.confidences, prediction.viewmats, views.Ks
     )
     grid = (views.images.shape[-2], views.images.shape[-1])
-    photos = _Photos(views, light, grid)
+    photos, whole = _Photos(views, light, grid), _Photos(views, light.whole, grid)
     views = replace(views, images=light.corrected(views.images).clamp(0, 1))
     left = strangers(views.images, prediction.depths, prediction.viewmats, views.Ks)
     scene = assemble_detailed(
@@ -93,8 +93,7 @@ def covered_scene(
         progress=lambda done: progress("elements", 0.1 + 0.3 * done),
     )
     timings = {**prediction.timings, "assembly": time.perf_counter() - start}
-    photos = _Photos(views, light.whole, grid)
-    return Covered(scene.with_record(cost=Cost(timings)), photos, left, light)
+    return Covered(scene.with_record(cost=Cost(timings)), whole, left, light)
 
 
 @torch.no_grad()
@@ -210,6 +209,7 @@ def _coloured(scene: Scene, photos: _Silent, light: Light, progress: Callable[[f
         ringing=_RINGING,
         slopes=len(photos) >= _SLOPES,
         leave_out=judged,
+        step=float((high - low).square().mean().sqrt()),
         progress=progress,
     )
     sh = colour_to_sh(low + (high - low) * solved.colours)[:, None]

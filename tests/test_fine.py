@@ -123,6 +123,14 @@ def test_pictures_at_the_photos_places_have_the_photos_light():
         assert near == pytest.approx(scene.record.detail["photos_psnr_db"][view], abs=0.5)
 
 
+def test_photos_without_sources_are_brought_to_one_light_once():
+    given = photographed(gains=(1.2, 0.84), ratio=1)
+    bare = replace(given, views=replace(given.views, sources=()))
+    scenes = [made(each)[0] for each in (given, bare)]
+    shown_by = [shown(scene, lit_camera(scene, scene.camera(1))) for scene in scenes]
+    assert (shown_by[0] - shown_by[1]).abs().mean() < 1 / 255  # photos of the sources have 8 bits
+
+
 def test_a_view_without_a_place_leaves_no_trace():
     given = photographed(3)
     scene, light = made(replace(given, prediction=replace(given.prediction, unplaced=(1,))))

@@ -29,6 +29,7 @@ from langflash_core.geometry.quaternions import matrices_to_quats
 from langflash_core.geometry.surfels import ellipses, spans
 from langflash_core.scene.assemble import sparse_weights
 from langflash_core.scene.joining import appended
+from langflash_core.scene.light import GAIN_RANGE, LARGEST_OFFSET
 from langflash_core.types import Camera, Gaussians, Scene
 
 from .looks import Render, mattes
@@ -39,6 +40,7 @@ OPACITY = 0.99
 _COVER, _THIN = 0.85, 0.1  # deviation over spacing, as elements of a scene have
 _FINER, _MOST_SIDE = 2, 512  # than the views' own grid they are looked at; pixels of the longer side
 _MOST_VIEWS = 12  # with the largest holes
+_BRIGHTEST = GAIN_RANGE[1] + LARGEST_OFFSET  # what a photo's white may be in the scene's light
 _LEAST = 12  # pixels of a hole
 _RING = 0.08  # of the longer side: what counts as around
 _FAR = 0.012  # of the depth: what lies on a plane
@@ -141,7 +143,7 @@ def _view(left: Scene, camera: Camera, matte: Tensor, before: Tensor, number: in
     ahead = rays(camera.K.cpu().double(), camera.width, camera.height) @ pose[:3, :3].T
     straight = frame.rgb.cpu().numpy() / np.maximum(alphas, 1 / 255)[..., None]
     return _View(
-        camera, ahead.numpy(), pose[:3, 3].numpy(), straight.clip(0, 1).astype(np.float64),
+        camera, ahead.numpy(), pose[:3, 3].numpy(), straight.clip(0, _BRIGHTEST).astype(np.float64),
         np.where(alphas >= 0.9, frame.depths.cpu().numpy(), 0.0).astype(np.float64),
         before.double().numpy(), hole, ring & (frame.depths.cpu().numpy() > 0),
         None if frame.weight_maps is None else frame.weight_maps.cpu().numpy(), number,
@@ -313,7 +315,7 @@ def _bent(view: _View, missing: Bool[np.ndarray, "H W"], sofar: Scene, render: R
     known = (alphas >= 0.9) & (depths > 0) & ~missing
     if missing.sum() < _LEAST or not known.any():
         return none
-    straight = (frame.rgb.cpu().numpy() / np.maximum(alphas, 1 / 255)[..., None]).clip(0, 1)
+    straight = (frame.rgb.cpu().numpy() / np.maximum(alphas, 1 / 255)[..., None]).clip(0, _BRIGHTEST)
     inverse = np.repeat((1 / np.maximum(depths, 1e-9))[..., None], 3, -1)
     depth = torch.from_numpy(1 / np.maximum(spread(inverse, known)[..., 0], 1e-9))
     points = unproject(depth, view.camera.K.cpu().double())

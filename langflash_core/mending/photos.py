@@ -12,14 +12,14 @@ from dataclasses import replace
 
 import cv2
 import numpy as np
-import torch
 from jaxtyping import Bool, Float, UInt8
 from PIL import Image
 
 from langflash_core.errors import SceneFileError
 from langflash_core.picture_files import STORED, opened_picture
+from langflash_core.scene.exposure import lit_camera
 from langflash_core.scene.gaps import filled
-from langflash_core.types import Frame, Scene
+from langflash_core.types import Camera, Scene
 
 from .looks import Render
 
@@ -56,9 +56,7 @@ def painted_over(scene: Scene, view: int, mask: Bool[np.ndarray, "H W"], render:
     height, width = photo.shape[:2]
     covered = cv2.resize(mask.astype(np.float32), (width, height), interpolation=cv2.INTER_LINEAR)
     covered = cv2.GaussianBlur((covered > 0).astype(np.float32), (0, 0), width / mask.shape[1]) > _ROUNDED
-    shown = _in_its_light(
-        _shown(render(scene, scene.camera(view, width, height), weight_maps=False)), scene, view
-    )
+    shown = _shown(scene, scene.camera(view, width, height), render)
     painted = np.where(covered[..., None], shown, photo)
     stream = io.BytesIO()
     Image.fromarray(painted).save(stream, "JPEG", quality=QUALITY)
@@ -73,7 +71,7 @@ def not_in_scene(scene: Scene, view: int, render: Render) -> Bool[np.ndarray, "H
     """
     width, height = scene.view_size
     photo = cv2.resize(_decoded(scene.photos[view], view), (width, height), interpolation=cv2.INTER_AREA)
-    shown = _in_its_light(_shown(render(scene, scene.camera(view), weight_maps=False)), scene, view)
+    shown = _shown(scene, scene.camera(view), render)
     apart = abs(photo.astype(np.float32) - shown.astype(np.float32)).mean(-1) / 255
     return cv2.blur(apart, (_PATCH, _PATCH)) > _STRANGE
 
@@ -98,14 +96,8 @@ def _decoded(photo: bytes, view: int) -> UInt8[np.ndarray, "h w 3"]:
         ) from error
 
 
-def _shown(frame: Frame) -> torch.Tensor:
-    """(h, w, 3), its gaps filled by what is around them."""
-    return filled(frame.rgb.cpu().float(), frame.alphas.cpu().float())
-
-
-def _in_its_light(shown: torch.Tensor, scene: Scene, view: int) -> UInt8[np.ndarray, "h w 3"]:
-    """Colours as this photo has them: before all photos were brought to one light."""
-    light = scene.record.light
-    if light:
-        shown = (shown - torch.tensor(light["offsets"][view])) / torch.tensor(light["gains"][view])
+def _shown(scene: Scene, camera: Camera, render: Render) -> UInt8[np.ndarray, "h w 3"]:
+    """A view as its photo has it, in that one's light, its gaps filled by what is around them."""
+    frame = render(scene, lit_camera(scene, camera), weight_maps=False)
+    shown = filled(frame.rgb.cpu().float(), frame.alphas.cpu().float())
     return (shown.clamp(0, 1) * 255).round().byte().numpy()

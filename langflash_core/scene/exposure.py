@@ -7,9 +7,10 @@ that it is the photo; between photos in a mixture; far from all of them in the s
 
     log g = sum_v w_v log g_v / (sum_v w_v + 1 / FAR^2),     w_v = 1 / (a_v^2 + d_v^2),
 
-and offsets alike, with a_v the angle to the photo's direction, radians, and d_v the way to its place in
-median distances of the Gaussians. What compares pictures of several places with each other, or makes
-Gaussians of them, draws in the scene's own light. `shaders/web` pages do the same (`page/cameras.js`).
+and offsets alike, with a_v the angle to the direction of the photo, radians, and d_v the way to its place in
+median distances of the Gaussians; how a photo was held does not matter. What compares pictures of several
+places with each other, or makes Gaussians of them, draws in the scene's own light. Web pages do the same
+(`export/page/cameras.js`).
 
 Source: own derivation; weights of Shepard 1968, "A two-dimensional interpolation function".
 """
@@ -24,8 +25,8 @@ from langflash_core.geometry.cameras import invert_rigid
 from langflash_core.types import Camera, Scene
 
 FAR = 0.25
-"""Radians: so far from the only photo, a picture is half in its light. Beside eight real photos .2 to .3 are
-best (MEASURED, "The light of a place")."""
+"""Radians: so far from the only photo, a picture is half in its light. Beside eight real photos .2 and .3 are
+best in the mean (MEASURED, "The light of a place")."""
 HERE = 1e-4  # radians, within which a place is a photo's own
 _SAMPLES = 1000  # Gaussians that tell the median distance
 
@@ -50,20 +51,18 @@ class PlaceLight:
         return PlaceLight(poses, median_distance(scene), np.log(gains), offsets)
 
     def lit(self, camera: Camera) -> Camera:
-        """The camera in the light of its place; as it is where the photos had one light, or rays are
-        parallel."""
-        if not len(self.poses) or camera.orthographic:
-            return camera
+        """The camera in the light of its place; in none where the photos had one light."""
+        if not len(self.poses):
+            return camera if camera.light is None else replace(camera, light=None)
         shares = self._shares(camera.viewmat.detach().cpu().double().numpy())
         light = np.stack((np.exp(shares @ self.logs), shares @ self.offsets))
         return replace(camera, light=torch.from_numpy(light).float())
 
     def _shares(self, viewmat: Float[np.ndarray, "4 4"]) -> Float[np.ndarray, " V"]:
         """What each photo's light counts; in sum up to 1, the rest is the scene's."""
-        turns = self.poses[:, :3, :3].transpose(0, 2, 1) @ viewmat[:3, :3].T
-        # |R - R'| = 2 sqrt(2) sin(a / 2): no digits are lost where a is small, as they are by arccos
-        chords = np.linalg.norm((turns - np.eye(3)).reshape(-1, 9), axis=1)
-        angles = 2 * np.arcsin(np.minimum(chords / 8**0.5, 1))
+        # |d - d'| = 2 sin(a / 2) of unit directions: small angles keep their digits, which arccos loses
+        chords = np.linalg.norm(self.poses[:, :3, 2] - viewmat[2, :3], axis=1)
+        angles = 2 * np.arcsin(np.minimum(chords / 2, 1))
         centre = -viewmat[:3, :3].T @ viewmat[:3, 3]
         ways = np.linalg.norm(self.poses[:, :3, 3] - centre, axis=1) / self.distance
         weights = 1 / (angles**2 + ways**2 + HERE**2)

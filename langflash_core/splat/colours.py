@@ -89,6 +89,7 @@ def solved_colours(
     ringing: float | None = None,
     slopes: bool = False,
     leave_out: bool = False,
+    step: float = 1.0,
     progress: Callable[[float], None] = lambda done: None,
 ) -> Solved:
     """Colours of Gaussians from all their photos.
@@ -103,6 +104,7 @@ def solved_colours(
             differs; None: within [0, 1], as far as they like.
         slopes: colours change with the direction.
         leave_out: Gaussians that hinder are found after half of the rounds, and left out of the others.
+        step: what 1 of the photos is worth, in sRGB, to what hinders.
         progress: called with the share that is done, before every view and every round; what it raises ends
             the work there.
 
@@ -135,6 +137,7 @@ def solved_colours(
     looks = group.solved(_looks(first, slopes), rounds - later, ringing)
     if leave_out:
         group.tell(tally, looks)
+        tally.gains *= step**2
         group.leave(tally.hindering)
         looks = group.solved(looks, later, ringing)
     nearness = tuple(

@@ -79,7 +79,7 @@ def refine(
     """The scene fitted to its photos, if that brings a held-out view closer to its photo.
 
     Args:
-        scene: with `view_ids`. photos: (V, 3, H, W) in [0, 1], at
+        scene: with `view_ids`. photos: (V, 3, H, W) in the scene's light, at
             `view_size`. budget: half of it for the trial, half for the fit with all photos.
         report: called with what is done and the fraction in [0, 1].
 
@@ -110,7 +110,7 @@ def refine(
 
 def psnr(rgb: Float[Tensor, "H W 3"], photo: Float[Tensor, "3 H W"], shown: Bool[Tensor, "H W"]) -> float:
     """dB over the pixels `shown` (H, W); rgb (H, W, 3), photo (3, H, W). Equal pictures give 100."""
-    error = (rgb.detach().clamp(0, 1) - photo.movedim(0, -1))[shown].square().mean()
+    error = (rgb.detach().clamp(0, 1) - photo.movedim(0, -1).clamp(0, 1))[shown].square().mean()
     return -10 * math.log10(max(float(error), 1e-10))
 
 

@@ -7,13 +7,18 @@ import numpy as np
 import pytest
 import torch
 
+from app.cli.lab.shared import colour_only
 from langflash_core import pipeline
+from langflash_core.export.png import to_8bit
 from langflash_core.geometry.cameras import invert_rigid
 from langflash_core.language.spaces import language_space
 from langflash_core.scene.exposure import FAR, lit_camera, median_distance
 from langflash_core.splat import render
 from langflash_core.splat.projection import view_colours
 from langflash_core.types import Camera, Scene
+from langflash_core.writing.cameras import chosen_camera
+from langflash_core.writing.films import picture
+from langflash_core.writing.renderers import TorchRenderer
 from tests.app.window.scenes import PHRASES, room
 from tests.splat.scenes import camera, cloud, parallel, turned
 
@@ -40,7 +45,7 @@ def twin(scene: Scene, viewmat: torch.Tensor) -> np.ndarray:
     here, total, logs, offsets = invert_rigid(viewmat.double()), 1 / FAR**2, np.zeros(3), np.zeros(3)
     for view, own in enumerate(scene.viewmats.double()):
         place = invert_rigid(own)
-        cosine = (float((place[:3, :3] * here[:3, :3]).sum()) - 1) / 2
+        cosine = float(place[:3, 2] @ here[:3, 2])
         way = float((place[:3, 3] - here[:3, 3]).norm()) / median_distance(scene)
         weight = 1 / (math.acos(max(-1.0, min(1.0, cosine))) ** 2 + way**2)
         total += weight
@@ -77,10 +82,32 @@ def test_far_away_it_is_the_scenes_own():
     assert (found - torch.tensor([[1.0] * 3, [0.0] * 3])).abs().max() < share * 0.4
 
 
-def test_nothing_changes_without_lights_or_with_parallel_rays():
+def test_photos_in_one_light_have_none():
     plain = lit_scene().with_record(light={})
     assert lit_camera(plain, plain.camera(1)).light is None
-    assert lit_camera(lit_scene(), parallel(lit_scene().camera(1))).light is None
+    assert lit_camera(plain, lit_camera(lit_scene(), plain.camera(1))).light is None  # nothing of another's
+
+
+@pytest.mark.parametrize("degrees", [5, 90])
+def test_how_the_camera_is_held_does_not_matter(degrees):
+    """The window shows photos upright that were held aslant, and with parallel rays."""
+    scene, angle = lit_scene(), math.radians(degrees)
+    roll = torch.eye(4)
+    roll[:2, :2] = torch.tensor([[math.cos(angle), -math.sin(angle)], [math.sin(angle), math.cos(angle)]])
+    plain = scene.camera(1)
+    for seen in (replace(plain, viewmat=roll @ plain.viewmat), parallel(plain)):
+        found = lit_camera(scene, seen).light
+        assert found is not None
+        assert (found - torch.tensor([GAINS[1], OFFSETS[1]])).abs().max() < 10 * EXACT  # a float32 product
+
+
+def test_a_single_photo_and_one_gaussian_that_is_no_number():
+    scene = lit_scene({"gains": GAINS[:1] * 3, "offsets": OFFSETS[:1] * 3})
+    means = torch.full_like(scene.gaussians.means, torch.nan)
+    scene = replace(scene, gaussians=replace(scene.gaussians, means=means))
+    assert median_distance(scene) == 1
+    found = lit_camera(scene, scene.camera(0)).light
+    assert found is not None and torch.isfinite(found).all()
 
 
 def test_a_camera_is_drawn_in_its_light_before_anything_is_clamped():
@@ -96,11 +123,17 @@ def test_a_camera_is_drawn_in_its_light_before_anything_is_clamped():
     assert (lit[~some] > 0).any()
 
 
-def test_answers_are_drawn_in_the_light_of_their_place():
+def test_whatever_people_see_is_drawn_in_the_light_of_its_place():
+    """Answers, files' cameras, films, what the lab judges; not what a scene's camera is by itself."""
     plain = room(language_space("minilm").encode(PHRASES))
     light = {name: [rows[0]] * plain.num_views for name, rows in LIGHT.items()}
     scene = plain.with_record(light=light)
-    found = pipeline.query(scene, PHRASES[0], view=0)
     expected = render(scene, lit_camera(scene, scene.camera(0)), weight_maps=False).rgb
-    assert torch.equal(found.frame.rgb, expected)
-    assert (expected - render(scene, scene.camera(0), weight_maps=False).rgb).abs().max() > 0.05
+    unlit = render(scene, scene.camera(0), weight_maps=False).rgb
+    assert (expected - unlit).abs().max() > 0.05
+    assert torch.equal(pipeline.query(scene, PHRASES[0], view=0).frame.rgb, expected)
+    chosen = chosen_camera(0, None, None, False).of(scene)
+    assert torch.equal(render(scene, chosen, weight_maps=False).rgb, expected)
+    renderer = TorchRenderer()
+    assert np.array_equal(picture(scene, scene.camera(0), renderer, None), to_8bit(expected))
+    assert torch.equal(colour_only(renderer)(scene, scene.camera(0)).rgb, expected)

@@ -29,8 +29,7 @@ function lightAt({ views, light }, { eye, turn }) {
       [0, 0, 0],
     ];
   const squares = views.map((view) => {
-    const chord = turn.reduce((sum, axis, row) => sum + length(plus(axis, view.turn[row], -1)) ** 2, 0);
-    const angle = 2 * Math.asin(Math.min(1, Math.sqrt(chord / 8)));
+    const angle = 2 * Math.asin(Math.min(1, length(plus(turn[2], view.turn[2], -1)) / 2));
     return angle ** 2 + (length(plus(eye, view.eye, -1)) / light.distance) ** 2;
   });
   const weights = squares.map((square) => 1 / (square + light.here ** 2));

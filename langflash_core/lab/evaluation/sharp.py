@@ -205,7 +205,7 @@ def _wordless(scene: Scene) -> Scene:
     count = len(scene.gaussians)
     ids = torch.zeros(count, 0, dtype=torch.int64)
     nothing = Semantics(ids, torch.zeros(count, 0), torch.zeros(0, 0), NO_LANGUAGE)
-    return replace(scene, semantics=nothing, record=Record())
+    return replace(scene, semantics=nothing, record=Record(light=scene.record.light))
 
 
 @dataclass(frozen=True)

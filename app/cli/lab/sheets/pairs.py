@@ -16,6 +16,7 @@ from langflash_core.geometry.cameras import invert_rigid
 from langflash_core.geometry.quaternions import matrices_to_quats, quats_to_matrices
 from langflash_core.picture_files import opened_picture
 from langflash_core.reconstruction.networks import Networks
+from langflash_core.scene.exposure import lit_camera
 from langflash_core.types import Camera, Scene
 
 from ...renderers import Renderer
@@ -54,10 +55,12 @@ def pair_sheet(
 
 
 def _views(scene: Scene, pair: Sequence[Path], renderer: Renderer) -> list[np.ndarray]:
-    own = _camera(scene, scene.viewmats[0])
+    own = lit_camera(scene, _camera(scene, scene.viewmats[0]))
     shown = renderer(scene, own, weight_maps=False)
-    between = _camera(scene, _between(scene.viewmats[0], scene.viewmats[1], 0.5))
-    beside = _camera(scene, _between(scene.viewmats[0], scene.viewmats[1], -_BESIDE))
+    between, beside = (
+        lit_camera(scene, _camera(scene, _between(scene.viewmats[0], scene.viewmats[1], share)))
+        for share in (0.5, -_BESIDE)
+    )
     near = float(shown.depths[shown.depths > 0].quantile(_NEAR_SHARE))
     nearness = (near / shown.depths.clamp_min(near)) * (shown.alphas > 0.5)
     photos = [_photo(path, (own.width, own.height)) for path in pair]
