@@ -5,6 +5,7 @@ from dataclasses import replace
 import pytest
 import torch
 from torch import Tensor
+from torch.nn import functional as F
 
 from langflash_core.detail import DETAILS
 from langflash_core.errors import InputError
@@ -121,6 +122,19 @@ def test_pictures_at_the_photos_places_have_the_photos_light():
         )
         assert near > far + 3
         assert near == pytest.approx(scene.record.detail["photos_psnr_db"][view], abs=0.5)
+
+
+def test_what_a_smeared_photo_sees_is_covered_by_a_sharp_one():
+    """The first of two photos has what both see, unless a hand moved: smeared over eight pixels, its pixels
+    are worth a third of the other's, and of detail it keeps the border that nobody else sees."""
+    given, shares = photographed(busy=True), []
+    smeared = F.avg_pool2d(F.pad(given.photos[0][None], (4, 3, 0, 0), mode="replicate"), (1, 8), 1)[0]
+    for first in (given.photos[0], smeared):
+        sources = (png(first), given.views.sources[1])
+        scene, _ = made(replace(given, views=replace(given.views, sources=sources)))
+        assert scene.view_ids is not None
+        shares.append(float((scene.view_ids == 0).float().mean()))
+    assert shares[0] > 0.7 and shares[1] < 0.3
 
 
 def test_photos_without_sources_are_brought_to_one_light_once():

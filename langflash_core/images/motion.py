@@ -43,10 +43,25 @@ class Look:
 def look_at(picture: UInt8[np.ndarray, "H W 3"]) -> Look:
     """Judge a picture."""
     grey = cv2.cvtColor(_shrunk(picture, SHARP_SIDE), cv2.COLOR_BGR2GRAY)
-    smooth = cv2.GaussianBlur(grey, (3, 3), 0)  # grain and coding are no detail
+    smooth = _smoothed(grey)
     sharpness = float(cv2.Laplacian(smooth, cv2.CV_32F).var())
-    rise = max(_rise(smooth), _rise(np.ascontiguousarray(smooth.T)))  # a hand that moves smears one direction
-    return Look(_shrunk(grey, SIDE), sharpness, rise, float(np.percentile(grey, 90)) / 255)
+    return Look(_shrunk(grey, SIDE), sharpness, _farther(smooth), float(np.percentile(grey, 90)) / 255)
+
+
+def edge_rise(grey: Grey) -> float:
+    """Pixels over which even the sharpest edges of a picture rise, along the direction in which they rise
+    farther; 0 where there are too few to tell."""
+    return _farther(_smoothed(grey))
+
+
+def _smoothed(grey: Grey) -> Grey:
+    """Grain and coding are no detail."""
+    return cv2.GaussianBlur(grey, (3, 3), 0).astype(np.uint8, copy=False)
+
+
+def _farther(smooth: Grey) -> float:
+    """A hand that moves smears one direction."""
+    return max(_rise(smooth), _rise(np.ascontiguousarray(smooth.T)))
 
 
 def _rise(grey: Grey) -> float:
