@@ -136,7 +136,8 @@ def query(
     Args:
         prompts: phrases, or one.
         view: input photo whose camera is used, from 0; not asked for where `camera` is given.
-        size: (width, height) in pixels; None: the camera's own.
+        size: (width, height) in pixels; None: the camera's own. It is drawn in the light of its place
+            (`scene.exposure`).
         mode: "relevancy" in (0, 1) or "cosine" in [-1, 1].
         negatives, threshold: instead of the scene's calibration.
         render: draws colour, depth and weight maps; None: the reference in torch.

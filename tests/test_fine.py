@@ -109,7 +109,7 @@ def test_light_is_recorded_where_it_is_not_the_identity():
 
 
 def test_pictures_at_the_photos_places_have_the_photos_light():
-    """Two photos, half a stop apart: what were white in the dark one is beyond white in the light of both.
+    """Two photos, half a stop apart: what would be white in the dark one is beyond it in the light of both.
     Without the light of the place each picture is a quarter of a stop off."""
     given = photographed(gains=(1.2, 0.84))
     scene, light = made(given)
@@ -120,8 +120,8 @@ def test_pictures_at_the_photos_places_have_the_photos_light():
             -10 * float((shown(scene, of) - photo.clamp(0, 1)).square().mean().log10())
             for of in (lit_camera(scene, camera), camera)
         )
-        assert near > far + 3
-        assert near == pytest.approx(scene.record.detail["photos_psnr_db"][view], abs=0.5)
+        assert near > far + 3  # 4.3 and 6.0; the greys of the screen are off by less
+        assert near == pytest.approx(scene.record.detail["photos_psnr_db"][view], abs=0.5)  # over black here
 
 
 def test_what_a_smeared_photo_sees_is_covered_by_a_sharp_one():

@@ -101,7 +101,7 @@ def test_how_the_camera_is_held_does_not_matter(degrees):
         assert (found - torch.tensor([GAINS[1], OFFSETS[1]])).abs().max() < 10 * EXACT  # a float32 product
 
 
-def test_a_single_photo_and_one_gaussian_that_is_no_number():
+def test_gaussians_that_are_no_numbers_tell_no_distance():
     scene = lit_scene({"gains": GAINS[:1] * 3, "offsets": OFFSETS[:1] * 3})
     means = torch.full_like(scene.gaussians.means, torch.nan)
     scene = replace(scene, gaussians=replace(scene.gaussians, means=means))

@@ -20,6 +20,7 @@ from langflash_core.language.relevance import compile_query
 from langflash_core.language.spaces import language_space
 from langflash_core.scene.edited import first_marks
 from langflash_core.scene.edits import delete
+from langflash_core.scene.exposure import lit_camera
 from langflash_core.scene.mask import Mask
 from langflash_core.scene.thin import thin_with_rows
 from tests.app.window.scenes import PHRASES, room, shown_scene
@@ -96,6 +97,33 @@ def test_what_moves_in_full_size_is_followed_by_the_exact_picture(context) -> No
         viewport.release()
     assert Plan(Kind.COLOUR) in plans[:-1], "the moving one came first"
     assert still is not None and (still.camera.width, still.camera.height) == SIZE
+
+
+def test_pictures_that_move_and_that_rest_are_in_the_light_of_their_place(context) -> None:
+    plain, shown = room(torch.eye(3, 384)), shown_scene()
+    assert shown.scene.info is not None
+    rows = [[1.4, 1.2, 0.8]] * plain.num_views
+    scene = plain.with_record(light={"gains": rows, "offsets": [[0.1, 0.0, -0.1]] * plain.num_views})
+    state = shown.with_scene(info=replace(shown.scene.info, scene=scene))
+    drawn = set()
+    with context:
+        viewport = Viewport(context)
+        viewport.set_scene(1, scene)
+        for turn in range(300):
+            pose = orbit(shown.scene.pose, 0.02 * min(turn, 5), 0.0)
+            state = replace(state.with_scene(pose=pose), now=state.now + 0.05)
+            viewport.update(state, SIZE, touched=state.now if turn < 5 else 0.0)
+            easel = None if viewport.picture is None else viewport.picture.easel
+            if easel is not None and easel.camera is not None and viewport.drawn is not None:
+                expected = lit_camera(scene, replace(easel.camera, light=None)).light
+                assert easel.camera.light is not None and expected is not None
+                assert torch.equal(easel.camera.light, expected)
+                drawn.add(getattr(viewport.drawn, "plan", None))
+            if turn > 5 and viewport.whole and not viewport.settling:
+                break
+            time.sleep(0.01)
+        viewport.release()
+    assert Plan(Kind.COLOUR) in drawn, "the one at rest"
 
 
 def test_a_scene_begins_without_the_targets_of_the_one_before(context) -> None:
