@@ -51,7 +51,8 @@ from langflash_core.images.strip import (
 from langflash_core.resources import home_folder
 from langflash_core.running import Progress
 
-PIECE = 0.03  # of the side that the picture moves in a piece, of which one frame is kept
+PIECE = 0.02  # of the side that the picture moves in a piece, of which one frame is kept
+RULER = 0.08  # of the side: who turns back where he goes on has gone so far, whose hand shakes has not
 FAST = 0.12  # of the side from one picture to the next: a hand does that, and may then be lost
 MOST_STILLS = 600  # more, and every second one goes
 STILL_SIDE, QUALITY = 1920, 92  # pixels of the longer side of a kept frame, at most
@@ -236,9 +237,12 @@ class _Watch:
             moved = Moved(moved.since_anchor, 0.0)
         else:
             self._judge(look, picture, seconds, place)
-        if self._follower.weak:
-            self._base, self._carried = place, self._carried + moved.since_mark
-            self._following = self._follower.anchor(look.grey)
+        weak = self._follower.weak
+        if weak or moved.since_anchor >= RULER:
+            anchored = self._follower.anchor(look.grey)
+            if anchored or weak:
+                self._base, self._carried = place, self._carried + moved.since_mark
+            self._following = anchored or not weak
 
     def _wide_step(self, look: Look) -> float | None:
         """How far a picture that cannot be followed is from the last one, where both show one room; so they

@@ -1,8 +1,9 @@
 """How a film moves: small grey pictures, and how far what they show has gone from one to the next.
 
 Lengths are shares of the picture's side, the root of its area. A few hundred corners are followed from one
-picture to the next, there and back; how far it moved is the median of how far they have gone since the last
-anchor, so a hand that shakes around one place goes nowhere.
+picture to the next, there and back; how far it moved is how far four fifths of them have gone since the last
+anchor at most, so a hand that shakes around one place goes nowhere. Not the median: where a camera goes
+around something, that stays in the middle, and what is before and behind it moves.
 """
 
 import math
@@ -19,7 +20,7 @@ BACK = 1.0  # pixels by which a corner may miss its place on the way back
 LOST = 0.15  # of the corners followed: below, this is another shot
 WEAK = 0.45  # of those at the anchor: below, fresh ones are taken
 SAME, ALIKE = 0.02, 0.85  # moved, most of what is seen, and correlation of two pictures from one place
-_MOST = 85  # per cent
+_FAR, _MOST = 80, 85  # per cent of the corners
 EDGE, EDGES, REACH = 30, 40, 15  # steps of grey of an edge that tells of blur, how many, pixels across it
 JOINS, AGREE = 16, 0.5  # matches that agree with one motion, and their share: two pictures show one room
 _TINY = (32, 24)
@@ -233,6 +234,6 @@ def _flow(one: np.ndarray, other: np.ndarray, points: np.ndarray, guess: np.ndar
     )
 
 
-def _gone(before: np.ndarray, now: np.ndarray, grey: np.ndarray, percent: float = 50) -> float:
+def _gone(before: np.ndarray, now: np.ndarray, grey: np.ndarray, percent: float = _FAR) -> float:
     """Way that so many per cent of the corners do not exceed, share of the side."""
     return float(np.percentile(np.linalg.norm(now - before, axis=1), percent)) / math.sqrt(grey.size)

@@ -19,11 +19,11 @@ from langflash_core.images.pictures import FILM_PHOTOS
 
 FORMAT = 1
 INDEX = "strip.json"
-SPACING = 0.1  # of the side, the root of a picture's area, from one chosen frame to the next: 5 degrees
+SPACING = 0.05  # of the side, the root of a picture's area, from one chosen frame to the next
 NARROWEST, WIDEST = 0.4, 0.35  # of the spacing; of the side: nearly half of a picture may then be new
 NEAR = 0.25  # of the side: frames that are compared for sharpness
 BLURRED, SMEARED = 0.4, 1.5  # sharpness below that of the sharpest near; edges that rise over more than usual
-APART = 0.3  # of the side: frames that are farther from each other have too little in common
+APART = 0.35  # of the side: frames that are farther from each other have too little in common
 STANDS = 0.02  # of the side: a film that moves less is a still
 _UNEVEN = 1.5  # what a gap twice as wide as the others costs, in factors of e of sharpness
 REPEAT, ELSEWHERE = "repeat", "elsewhere"

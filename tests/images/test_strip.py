@@ -42,10 +42,10 @@ def test_the_choice_is_the_best_of_all(seed: int) -> None:
 
 def test_stills_of_elsewhere_and_repeats_take_no_room() -> None:
     reasons = ["", "", "", *["repeat"] * 20, "", "", ""]
-    places = np.linspace(0, 2.5, 26)
+    places = module.SPACING * np.arange(26)
     choice = choose(strip(places, np.ones(26), reasons), 32)
     assert set(choice.chosen) <= {0, 1, 2, 23, 24, 25} and choice.left["repeats"] == 20
-    assert choice.gap < 2 * module.SPACING
+    assert choice.gap < 1.5 * module.SPACING, "and not the twenty that lie between"
 
 
 def test_a_film_without_a_way_is_refused() -> None:

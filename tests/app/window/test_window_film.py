@@ -53,7 +53,7 @@ def test_what_is_no_film_is_said(program: Program, folder: Path) -> None:
 
 
 def test_a_film_becomes_a_scene(program: Program, folder: Path) -> None:
-    walk = films.write(folder / "walk.mp4", films.walk(10, 10.0))
+    walk = films.write(folder / "walk.mp4", films.walk(6, 10.0))
     drop(program, walk)
     program.until(lambda s: s["dialog"] == "film", Dialog.FILM.value)
     program.until(lambda s: any(name.endswith("Reconstruct") for name in s["items"]), "the strip")
@@ -64,5 +64,5 @@ def test_a_film_becomes_a_scene(program: Program, folder: Path) -> None:
     program.click("Reconstruct")
     program.until(lambda s: s["job"] is not None, "the job")
     seen = program.until(lambda s: s["scene"] is not None and s["job"] is None, "the scene")
-    assert 2 <= len(seen["photos"]) <= 4 and all(name.startswith("walk.mp4 @ ") for name in seen["photos"])
+    assert 3 <= len(seen["photos"]) <= 6 and all(name.startswith("walk.mp4 @ ") for name in seen["photos"])
     assert seen["gl_errors"] == []
