@@ -3,7 +3,8 @@
 Lengths are shares of the picture's side, the root of its area. A few hundred corners are followed from one
 picture to the next, there and back; how far it moved is how far four fifths of them have gone since the last
 anchor at most, so a hand that shakes around one place goes nowhere. Not the median: where a camera goes
-around something, that stays in the middle, and what is before and behind it moves.
+around something, that stays in the middle, and what is before and behind it moves. But where two fifths
+have not moved at all, the camera stands, and somebody walks through what it sees.
 """
 
 import math
@@ -20,7 +21,8 @@ BACK = 1.0  # pixels by which a corner may miss its place on the way back
 LOST = 0.15  # of the corners followed: below, this is another shot
 WEAK = 0.45  # of those at the anchor: below, fresh ones are taken
 SAME, ALIKE = 0.02, 0.85  # moved, most of what is seen, and correlation of two pictures from one place
-_FAR, _MOST = 80, 85  # per cent of the corners
+_FAR, _MOST, _STAY = 80, 85, 40  # per cent of the corners
+_MOVES = 1.0  # pixels: less is where corners are found, not where they are
 EDGE, EDGES, REACH = 30, 40, 15  # steps of grey of an edge that tells of blur, how many, pixels across it
 JOINS, AGREE = 16, 0.5  # matches that agree with one motion, and their share: two pictures show one room
 _TINY = (32, 24)
@@ -236,4 +238,5 @@ def _flow(one: np.ndarray, other: np.ndarray, points: np.ndarray, guess: np.ndar
 
 def _gone(before: np.ndarray, now: np.ndarray, grey: np.ndarray, percent: float = _FAR) -> float:
     """Way that so many per cent of the corners do not exceed, share of the side."""
-    return float(np.percentile(np.linalg.norm(now - before, axis=1), percent)) / math.sqrt(grey.size)
+    stay, far = np.percentile(np.linalg.norm(now - before, axis=1), (_STAY, percent))
+    return float(stay if stay < _MOVES else far) / math.sqrt(grey.size)

@@ -72,6 +72,22 @@ def test_a_hand_that_sways_goes_nowhere(tmp_path: Path) -> None:
     assert strip.stills[-1].place - strip.stills[0].place < frames.RULER and len(choice.chosen) <= 3
 
 
+def passed(share: float) -> np.ndarray:
+    """A wall before which somebody walks, a fifth of the picture wide, as full of corners."""
+    picture, wide = films.seen(60), films.SIZE[0] // 5
+    left = round(share * (films.SIZE[0] + wide)) - wide
+    begin, end = max(left, 0), min(left + wide, films.SIZE[0])
+    picture[30:, begin:end] = films.seen(0, picture=films.wall(7))[30:, begin - left : end - left]
+    return picture
+
+
+def test_who_walks_through_moves_no_camera(tmp_path: Path) -> None:
+    """Three times past a camera on a tripod, a fifth of its picture wide."""
+    path = films.write(tmp_path / "tripod.mp4", [passed(i / 60 % 1) for i in range(180)])
+    with pytest.raises(FilmError, match="stands still"):
+        frames.frames(path)
+
+
 def test_blurred_frames_are_left_out_and_counted(tmp_path: Path) -> None:
     pictures = [film if i % 3 == 1 else films.smeared(film) for i, film in enumerate(films.walk(60))]
     strip, choice = chosen(films.write(tmp_path / "walk.mp4", pictures))
