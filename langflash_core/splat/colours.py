@@ -25,8 +25,10 @@ Sizes: V views, N Gaussians, n of them in one view, h w pixels of a photo.
 """
 
 import math
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from operator import methodcaller
+from typing import TypeVar
 
 import cv2
 import numpy as np
@@ -35,6 +37,7 @@ import torch
 from jaxtyping import Bool, Float, Int
 from torch import Tensor
 
+from langflash_core.at_once import at_once
 from langflash_core.geometry.cameras import invert_rigid
 from langflash_core.memory import give_back
 from langflash_core.splat.frustum import Packs, reaches
@@ -62,6 +65,9 @@ _WINDOWS, _FINE = (5, 13), 1.5
 _STEP = 0.5 / 255  # to which the photo is rounded there
 _OF_VIEWS = 0.75  # of the time, for which contributions are listed
 _SEEN = 0.05  # contributions of a Gaussian over all pixels, below which its colour stays
+
+
+Made = TypeVar("Made")
 
 
 @dataclass(frozen=True)
@@ -121,13 +127,21 @@ def solved_colours(
     packs, group = Packs.of(gaussians), _Group(len(first), progress, rounds)
     share = 1 if owners is None or len(photos) <= _MANY else -(-len(photos) // _EVERY)
     cuts = _JUDGED if leave_out else {}
-    for view in range(len(photos)):
-        progress(_OF_VIEWS * view / len(photos))
+
+    def seen(view: int) -> _View:
         rows = packs.before(cameras[view])
         own = None if owners is None or share == 1 else (owners[rows.to(owners.device)] == view)
         spoken = None if own is None else _Spoken(own.cpu().numpy(), view, share)
         trust = None if trusts is None else trusts[view]
-        group.views.append(_View.of(gaussians, rows, cameras[view], photos[view], trust, cuts, spoken))
+        return _View.of(gaussians, rows, cameras[view], photos[view], trust, cuts, spoken)
+
+    def turns() -> Iterator[int]:
+        for view in range(len(photos)):
+            progress(_OF_VIEWS * view / len(photos))
+            yield view
+
+    for view in at_once(seen, turns()):
+        group.views.append(view)
         if len(photos) > _MANY:
             give_back()  # each view leaves holes of other sizes
     if slopes:
@@ -195,8 +209,8 @@ class _Group:
             self._progress(_OF_VIEWS + (1 - _OF_VIEWS) * self._done / self._rounds)
             self._done += 1
             said = np.zeros_like(start)
-            for view in self.views:
-                said[view.ids] += view.carried_back(ahead)
+            for view, own in self._of_each(methodcaller("carried_back", ahead)):
+                said[view.ids] += own
             found = steps.taken(ahead, said)
             found[:, 0] = np.clip(found[:, 0], low, high)
             following = (1 + math.sqrt(1 + 4 * pace * pace)) / 2
@@ -206,12 +220,16 @@ class _Group:
 
     def tell(self, tally: Tally, looks: np.ndarray) -> None:
         """What all views say of each Gaussian that looks so (N, B, 3)."""
-        for view in self.views:
-            view.tell(tally, looks)
+        for view, own in self._of_each(methodcaller("told", looks)):
+            tally.take(view.ids, *own)
 
     def leave(self, gone: np.ndarray) -> None:
         """Some Gaussians, (N,) bool, are not drawn any more."""
-        self.views = [view.without(gone[view.ids]) for view in self.views]
+        self.views = [left for _, left in self._of_each(lambda view: view.without(gone[view.ids]))]
+
+    def _of_each(self, make: Callable[["_View"], Made]) -> Iterator[tuple["_View", Made]]:
+        """Each view, in order, and what is made of it."""
+        return zip(self.views, at_once(make, self.views), strict=True)
 
     def _bounds(
         self, start: np.ndarray, ringing: float | None
@@ -357,10 +375,11 @@ class _View:
         own = looks[self.ids]
         return own[:, 0] if self.bases is None else np.einsum("nb,nbc->nc", self.bases, own)
 
-    def tell(self, tally: Tally, looks: np.ndarray) -> None:
-        """What is nearer to the photo without each Gaussian."""
+    def told(self, looks: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """(n,) by how much the picture is nearer to the photo without each Gaussian; (n,) what each
+        contributes."""
         pairs = Pairs.of(self.contributions, self.light)
-        tally.take(pairs, self.ids, self.colours(looks), self.photo, self.shown[:, 0] > 0)
+        return pairs.gains(self.colours(looks), self.photo, self.shown[:, 0] > 0), pairs.sums(len(self.ids))
 
     def without(self, gone: np.ndarray) -> "_View":
         """The same without some of its Gaussians, (n,) bool."""

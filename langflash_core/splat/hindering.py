@@ -81,6 +81,10 @@ class Pairs:
         found[~shown[self.pixels]] = 0
         return np.bincount(self.ids, found, len(colours))
 
+    def sums(self, count: int) -> Float[np.ndarray, " n"]:
+        """What each of so many Gaussians contributes in all."""
+        return np.bincount(self.ids, self.shares, count)
+
     def without(
         self, gone: Bool[np.ndarray, " n"]
     ) -> tuple[scipy.sparse.csr_matrix, Float[np.ndarray, " P"]]:
@@ -112,17 +116,14 @@ class Tally:
 
     def take(
         self,
-        pairs: Pairs,
         ids: Int[np.ndarray, " n"],
-        colours: Float[np.ndarray, "n 3"],
-        photo: Float[np.ndarray, "P 3"],
-        shown: Bool[np.ndarray, " P"],
+        gains: Float[np.ndarray, " n"],
+        sums: Float[np.ndarray, " n"],
     ) -> None:
-        """What one view says of the Gaussians `ids` that it shows."""
-        self.gains[ids] += pairs.gains(colours, photo, shown)
-        shares = np.bincount(pairs.ids, pairs.shares, len(ids))
-        self.shown[ids] += shares
-        self.witnesses[ids] += shares > _SEEN
+        """What one view says of the Gaussians `ids` that it shows, as `Pairs` has it."""
+        self.gains[ids] += gains
+        self.shown[ids] += sums
+        self.witnesses[ids] += sums > _SEEN
 
     @property
     def hindering(self) -> Bool[np.ndarray, " N"]:

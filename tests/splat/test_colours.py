@@ -25,6 +25,7 @@ from langflash_core.splat.projection import project
 from langflash_core.splat.reference import rasterize
 from langflash_core.types import Camera, Gaussians
 from tests.splat.scenes import camera, cloud, parallel, splats, turned
+from tests.torch_threads import torch_threads
 
 CLOSE = 1e-5  # sums of some tens of float32 numbers in [0, 1]
 SIDE = turned(0.2, (-0.3, 0.02, 0.1))
@@ -257,6 +258,16 @@ def test_twice_is_the_same_to_the_last_bit():
     photos = [torch.rand(3, 40, 48)] * 2
     one, two = (solved_colours(gaussians, colours, views(2), photos) for _ in range(2))
     assert torch.equal(one.colours, two.colours) and one.psnr == two.psnr
+
+
+def test_several_threads_say_the_same():
+    gaussians, colours = scene()
+    photos = list(torch.rand(2, 3, 40, 48))
+    found = []
+    for count in (1, 3):
+        with torch_threads(count):
+            found.append(solved_colours(gaussians, colours, views(2), photos))
+    assert torch.equal(found[0].colours, found[1].colours) and found[0].psnr == found[1].psnr
 
 
 def test_photos_and_cameras_are_as_many():

@@ -68,9 +68,9 @@ def test_pixels_that_are_not_shown_say_nothing():
     assert np.abs(pairs.gains(colours, photo, np.zeros(480, bool))).max() == 0
     tally = Tally.of(50)
     for _ in range(3):
-        tally.take(pairs, np.arange(40) + 10, colours, photo, np.ones(480, bool))
+        tally.take(np.arange(40) + 10, pairs.gains(colours, photo, np.ones(480, bool)), pairs.sums(40))
     assert not tally.hindering.any() and (tally.gains > 0).any(), "three views let nothing go"
-    tally.take(pairs, np.arange(40) + 10, colours, photo, np.ones(480, bool))
+    tally.take(np.arange(40) + 10, pairs.gains(colours, photo, np.ones(480, bool)), pairs.sums(40))
     assert tally.hindering.any() and not tally.hindering[:10].any()
 
 
