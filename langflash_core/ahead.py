@@ -27,13 +27,14 @@ _WORKERS = 3  # at most; one processor stays with the import
 @dataclass(frozen=True)
 class Ahead:
     """What is under way: the photos, their key points as arrays where the preset matches photos, and the file
-    of weights, where it was asked for."""
+    of weights, where it was asked for. gone_on: steps that an earlier run kept, once they are used."""
 
     pictures: Future[list[Picture]]
     matched: Future[Arrays | None]
     stored: Future[Stored] | None
     matching: "Matching" = field(default_factory=lambda: Matching())
     ended: Event = field(default_factory=Event)
+    gone_on: list[str] = field(default_factory=list)
 
     def end(self) -> None:
         """What is still under way stops at its next photo or pair; returns when it has.
@@ -128,10 +129,10 @@ def begin(
         path = weights_file(preset, None if weights is None else Path(weights))
         read_header(path)
         stored = pool.submit(_stored, pictures, path)
-    matching = Matching()
-    matched = pool.submit(_match, pictures, going_on, matching, keep) if matches else _nothing()
+    matching, gone_on = Matching(), list[str]()
+    matched = pool.submit(_match, pictures, going_on, matching, keep, gone_on) if matches else _nothing()
     pool.shutdown(wait=False)
-    return Ahead(pictures, matched, stored, matching, ended)
+    return Ahead(pictures, matched, stored, matching, ended, gone_on)
 
 
 def _stored(pictures: Future[list[Picture]], path: Path) -> Stored:
@@ -141,12 +142,16 @@ def _stored(pictures: Future[list[Picture]], path: Path) -> Stored:
 
 
 def _match(
-    pictures: Future[list[Picture]], check: Callable[[], None], matching: Matching, keep: Path | None
+    pictures: Future[list[Picture]],
+    check: Callable[[], None],
+    matching: Matching,
+    keep: Path | None,
+    gone_on: list[str],
 ) -> Arrays | None:
     from langflash_core.network.stereo.keypoints import match_sources  # OpenCV
 
     sources = _sources(pictures)
-    kept = not_kept if keep is None else Keep.of(keep, {}, sources)
+    kept = not_kept if keep is None else Keep.of(keep, {}, sources, gone_on)
     return kept(MATCHES, lambda: match_sources(sources, check, matching.tell).arrays())
 
 

@@ -9,7 +9,7 @@ import hashlib
 import json
 from collections.abc import Callable, Iterable, Mapping
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -28,18 +28,23 @@ _ENDING = ".kept.npz"
 
 @dataclass(frozen=True)
 class Keep:
-    """Steps in a folder. key: the fingerprint of what they hang on."""
+    """Steps in a folder. key: the fingerprint of what they hang on. found: the names of those that were there
+    are added to it, as they are asked for."""
 
     folder: Path
     key: str
+    found: list[str] = field(default_factory=list, compare=False)
 
     @staticmethod
-    def of(folder: Path, said: Mapping[str, Any], parts: Iterable[bytes] = ()) -> "Keep":
-        """said: settings, as JSON has them. parts: what else results hang on."""
+    def of(
+        folder: Path, said: Mapping[str, Any], parts: Iterable[bytes] = (), found: list[str] | None = None
+    ) -> "Keep":
+        """said: settings, as JSON has them. parts: what else results hang on. found: as the field; None: a
+        list of its own."""
         digest = hashlib.sha256(json.dumps([STEPS, said], sort_keys=True, default=str).encode())
         for part in parts:
             digest.update(hashlib.sha256(part).digest())
-        return Keep(folder, digest.hexdigest()[:24])
+        return Keep(folder, digest.hexdigest()[:24], [] if found is None else found)
 
     def __call__(self, name: str, make: Made) -> Arrays:
         """The result of a step: what was kept of it, else what `make` gives, which is kept then.
@@ -50,6 +55,7 @@ class Keep:
         path = self.folder / f"{name}-{self.key}{_ENDING}"
         found = _read(path)
         if found is not None:
+            self.found.append(name)
             return found
         made = make()
         with written_atomically(path) as temporary, temporary.open("wb") as stream:

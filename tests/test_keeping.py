@@ -34,7 +34,7 @@ def test_a_step_is_made_once(tmp_path: Path):
     first, second = keep("depth-0", make), keep("depth-0", make)
     assert len(made) == 1 and np.array_equal(first["values"], second["values"])
     keep("depth-1", make)
-    assert len(made) == 2
+    assert len(made) == 2 and keep.found == ["depth-0"]
     for other in (
         Keep.of(keep.folder, {"size": 4}, [b"photo"]),
         Keep.of(keep.folder, {"size": 3}, [b"other"]),

@@ -99,13 +99,23 @@ class ProgressBar:
         self.stream.flush()
         self.drawn = len(line)
 
+    def say(self, line: str) -> None:
+        """A line of its own, which stays above the bar."""
+        self._wipe()
+        self.stream.write(f"{line}\n")
+        self.stream.flush()
+
     def __enter__(self) -> "ProgressBar":
         return self
 
     def __exit__(self, *_: object) -> None:
+        self._wipe()
+
+    def _wipe(self) -> None:
         if self.live and self.drawn:
             self.stream.write("\r" + " " * self.drawn + "\r")
             self.stream.flush()
+            self.drawn = 0
 
 
 def write_tables(args: Namespace, result: dict, table: str, out: TextIO) -> None:

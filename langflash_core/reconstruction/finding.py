@@ -27,19 +27,19 @@ def predictor(wishes: Wishes, tools: Tools, ahead: Ahead, run: Run) -> Callable[
     def predicted(views: Views) -> Prediction:
         if wishes.keep is None:
             return _made(views, not_kept, tools, ahead, run)
-        kept = keep_of(wishes.keep, views, _settings(wishes, tools))
+        kept = keep_of(wishes.keep, views, _settings(wishes, tools), ahead.gone_on)
         return prediction_of(kept("prediction", lambda: arrays_of(_made(views, kept, tools, ahead, run))))
 
     return predicted
 
 
-def keep_of(folder: Path, views: Views, settings: tuple) -> Keep:
-    """Where what these views become is kept; hangs on all that changes a bit of it."""
+def keep_of(folder: Path, views: Views, settings: tuple, found: list[str] | None = None) -> Keep:
+    """Where what these views become is kept; hangs on all that changes a bit of it. found: as of `Keep`."""
     machine = (torch.__version__, torch.get_num_threads(), torch.backends.cpu.get_cpu_capability())
     said = {"settings": settings, "machine": machine, "names": views.names, "lenses": views.lenses}
     numbers = [views.images, views.Ks] + ([] if views.viewmats is None else [views.viewmats])
     parts = (values.contiguous().numpy().tobytes() for values in numbers)
-    return Keep.of(folder, said, (*views.sources, *parts))
+    return Keep.of(folder, said, (*views.sources, *parts), found)
 
 
 def _made(views: Views, kept: Kept, tools: Tools, ahead: Ahead, run: Run) -> Prediction:

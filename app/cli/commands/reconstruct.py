@@ -3,24 +3,25 @@
 import time
 from argparse import Namespace
 from collections.abc import Sequence
-from contextlib import nullcontext
+from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
 
 from langflash_core.errors import ImageError, InputError, WeightsError
 from langflash_core.files import check_output_file, held_alone, readable_file
 from langflash_core.formats import is_film
-from langflash_core.keeping import forget
+from langflash_core.keeping import forget, holds_steps
 
 from ..films import recorded, with_frames
-from ..report import ProgressBar, say_warnings, write_json
+from ..report import INTERRUPTED, ProgressBar, say_error, say_warnings, write_json
 
 if TYPE_CHECKING:
     from langflash_core.types import Scene
 
 
-def run(args: Namespace, out: TextIO) -> None:
-    """Check everything that can be checked, then predict, assemble, and write one file.
+def run(args: Namespace, out: TextIO) -> int:
+    """Check everything that can be checked, then predict, assemble, and write one file; the exit code: 0, or
+    130 where Ctrl-C ended it and what was done is kept.
 
     Raises:
         LangFlashError: a photo, the weights, the device or the output cannot be used.
@@ -38,10 +39,13 @@ def run(args: Namespace, out: TextIO) -> None:
         args.photos, films, notes = with_frames(
             args.photos, progress, most=args.frames, start=args.start, end=args.end
         )
-    with nullcontext() if args.keep is None else held_alone(args.keep):
-        scene = _written(args, films)
-        if args.keep is not None:
-            forget(args.keep)
+    try:
+        scene = _written(args, films) if args.keep is None else _kept(args, films)
+    except KeyboardInterrupt:
+        if args.keep is None or not holds_steps(args.keep):
+            raise
+        say_error(f"stopped; what is done is kept in {args.keep}, the same command goes on from there")
+        return INTERRUPTED
     from langflash_core.scene.report import describe, world_line
 
     say_warnings((*notes, *scene.record.warnings))
@@ -58,6 +62,19 @@ def run(args: Namespace, out: TextIO) -> None:
         print(_sentence(args.output, scene, document), file=out)
         if scene.record.world is not None:
             print(world_line(scene.record.world, scene.record.metric_scale), file=out)
+    return 0
+
+
+def _kept(args: Namespace, films: Sequence[dict[str, Any]]) -> "Scene":
+    """The scene, once it is on the disk; what was kept goes then, and the folder once nothing is in it."""
+    try:
+        with held_alone(args.keep):
+            scene = _written(args, films)
+            forget(args.keep)
+            return scene
+    finally:
+        with suppress(OSError):
+            args.keep.rmdir()
 
 
 def _written(args: Namespace, films: Sequence[dict[str, Any]]) -> "Scene":
@@ -75,6 +92,14 @@ def _written(args: Namespace, films: Sequence[dict[str, Any]]) -> "Scene":
         posed = read_posed(args.poses).of(args.photos)
         lens, viewmats = posed.lens(), posed.viewmats
     with ProgressBar() as progress:
+        said = list[str]()
+
+        def told(stage: str, fraction: float) -> None:
+            if ahead.gone_on and not said:
+                said.append(f"going on from what an earlier run kept in {args.keep}")
+                progress.say(said[0])
+            progress(stage, fraction)
+
         scene = pipeline.reconstruct(
             args.photos,
             **lens,
@@ -90,7 +115,7 @@ def _written(args: Namespace, films: Sequence[dict[str, Any]]) -> "Scene":
             gaussians=args.gaussians,
             refine_seconds=args.refine,
             keep=args.keep,
-            progress=progress,
+            progress=told,
             ahead=ahead,
         )
         if films:
