@@ -188,24 +188,25 @@ class _Watch:
             self._see(seconds, picture)
             progress(STAGE, min(max((seconds - start) / whole, 0.0), 1.0) if whole > 0 else 0.0)
         self._close()
-        self._check(film.name, film.seconds, start)
+        self._check(film.name, film.seconds, start, end)
         self._find_blurred()
         self._find_repeats(check)
         shots = self._join_shots(check)
         kept = sum(still.looks for still in self._stills if still.why_not != ELSEWHERE)
         if self._lost > self._looked / 2 and kept < self._looked / 4:
             raise _bare(film.name)
-        notes = self._notes(film.name, film.seconds if end is None else min(end, film.seconds), last, shots)
+        until = film.seconds if end is None else min(end, film.seconds)  # 0: the film does not say
+        early = bool(until) and last < 0.9 * until - 0.5
         return Strip(
             film.name,
             self._folder,
-            round(last - (first or 0.0), 3),
+            round(last - (first or 0.0) if early or not until else until - start, 3),
             tuple(self._stills),
             dark=self._dark,
             plain=self._plain,
             shots=shots,
             every=self._every,
-            notes=notes,
+            notes=self._notes(film.name, until if early else 0.0, last, shots),
         )
 
     def _see(self, seconds: float, picture: np.ndarray) -> None:
@@ -327,10 +328,15 @@ class _Watch:
             smear = round(self._rises[index] / usual, 3)
             self._stills[index] = replace(still, blurred=int(blurred), smear=smear)
 
-    def _check(self, name: str, seconds: float, start: float) -> None:
+    def _check(self, name: str, seconds: float, start: float, end: float | None) -> None:
         """Raises:
         FilmError: nothing was seen, or nothing that can be followed.
         """
+        whole = start <= 0 and (end is None or 0 < seconds <= end)
+        if (self._looked == 1 and not whole) or (not self._looked and 0 < start < seconds):
+            part = f"from {start:g} s on" if end is None else f"from {start:g} to {end:g} s"
+            seen = "one picture only" if self._looked else "no picture"
+            raise FilmError(f"{name} shows {seen} {part}; take a longer part with --from and --to")
         if not self._looked:
             if start > 0:
                 raise FilmError(f"{name} shows nothing from {start:g} s on; it is {seconds:.1f} s long")
@@ -392,11 +398,12 @@ class _Watch:
     def _looks(self, indices: list[int]) -> int:
         return sum(self._stills[index].looks for index in indices)
 
-    def _notes(self, name: str, wanted: float, last: float, shots: int) -> tuple[str, ...]:
+    def _notes(self, name: str, missed: float, last: float, shots: int) -> tuple[str, ...]:
+        """missed: the second up to which it was to be looked at, where it ended early."""
         notes = []
-        if wanted and last < 0.9 * wanted - 0.5:
+        if missed:
             notes.append(
-                f"{name} ends after {last:.1f} of {wanted:.1f} seconds, what follows cannot be decoded; "
+                f"{name} ends after {last:.1f} of {missed:.1f} seconds, what follows cannot be decoded; "
                 "copy the film again"
             )
         if shots > 1:

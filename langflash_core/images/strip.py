@@ -17,7 +17,7 @@ from jaxtyping import Bool, Float, Int
 from langflash_core.errors import FilmError
 from langflash_core.images.pictures import FILM_PHOTOS
 
-FORMAT = 1
+FORMAT = 2
 INDEX = "strip.json"
 SPACING = 0.05  # of the side, the root of a picture's area, from one chosen frame to the next
 NARROWEST, WIDEST = 0.4, 0.35  # of the spacing; of the side: nearly half of a picture may then be new
@@ -57,8 +57,9 @@ class Still:
 
 @dataclass(frozen=True)
 class Strip:
-    """A film's stills in order. seconds: of film that were looked at. dark, plain: frames in which nothing
-    can be followed. shots: how many there are, those of one room as one. notes: for people."""
+    """A film's stills in order. seconds: of film that were looked at, its last picture's included. dark,
+    plain: frames in which nothing can be followed. shots: how many there are, those of one room as one.
+    notes: for people."""
 
     film: str
     folder: Path

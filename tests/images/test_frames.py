@@ -160,12 +160,33 @@ def test_what_shows_nothing_is_a_sentence(tmp_path: Path, home: Path) -> None:
     assert len(list((home / "films").iterdir())) == 1, "nothing of those is kept but the still's frame"
 
 
+@pytest.mark.parametrize(("part", "said"), [
+    ((1.0, 1.03), "shows one picture only from 1 to 1.03 s; take a longer part with --from and --to"),
+    ((0.0, 0.03), "one picture only from 0 to 0.03 s"), ((1.26, None), "one picture only from 1.26 s on"),
+    ((1.01, 1.03), "shows no picture from 1.01 to 1.03 s"),
+])  # fmt: skip
+def test_a_part_that_is_too_short_says_so(
+    tmp_path: Path, part: tuple[float, float | None], said: str
+) -> None:
+    path = films.write(tmp_path / "walk.mp4", films.walk(20))
+    with pytest.raises(FilmError) as refused:
+        strip_of(path, start=part[0], end=part[1])
+    assert said in str(refused.value)
+
+
+def test_a_strip_is_as_long_as_its_film_says(tmp_path: Path) -> None:
+    path = films.write(tmp_path / "walk.mp4", films.walk(30))
+    assert strip_of(path).seconds == 2.0 == strip_of(path, end=60.0).seconds
+    assert strip_of(path, start=0.5, end=1.5).seconds == 1.0
+
+
 def test_a_film_that_ends_too_early_says_so(tmp_path: Path) -> None:
     path = films.write(tmp_path / "walk.mp4", films.walk(60), films.RATE, "-movflags", "+faststart")
     content = path.read_bytes()
     path.write_bytes(content[: len(content) // 2])
     strip, choice = chosen(path)
     assert any("cannot be decoded" in note for note in notes_on(strip, choice))
+    assert strip.seconds < 3.5, "of 4 it says"
 
 
 def test_nothing_is_decoded_twice(tmp_path: Path, home: Path, monkeypatch) -> None:
