@@ -36,7 +36,8 @@ the time."""
 _SLOPES = 3
 """Photos from which on colours change with the direction. Of two they bring 2 dB at their own places, nothing
 between, and -.1, -.3 and -.6 dB 20, 30 and 45 degrees aside."""
-_LEFT_OUT = "{} something that the others do not ({}); it is left out"
+_LEFT_OUT = "1 photo shows something that the others do not ({}); it is left out"
+_LEFT_OUT_OF_SOME = "{} photos show things that the others do not ({}); those things are left out"
 _SHARP = 1.1
 """Times the width of the sharpest photo's edges, up to which a photo is as sharp: rendered photos of one room
 differ by 1.03, of 32 real ones half by 1.4 to 2."""
@@ -109,7 +110,7 @@ def coloured_scene(covered: Covered, progress: Progress = lambda stage, fraction
     scene = _coloured(covered.scene, silent, light, lambda done: progress("colours", 0.4 + 0.5 * done))
     timings = {**scene.record.cost.timings, "colours": time.perf_counter() - solving}
     shares = _shares(left)
-    said = (*scene.record.warnings, *([_LEFT_OUT.format(*_counted(shares))] if shares else []))
+    said = (*scene.record.warnings, *_told(shares, scene.record.photos))
     left_out = {**scene.record.left_out, **shares}
     record = {"light": covered.light.stored(), "left_out": left_out, "warnings": said}
     scene = scene.with_record(**record, cost=Cost(timings))
@@ -198,10 +199,12 @@ def _shares(left: Tensor) -> dict[str, list[float]]:
     return {"shares": shares} if any(shares) else {}
 
 
-def _counted(left_out: dict[str, list[float]]) -> tuple[str, str]:
-    """Which photos show what others do not, and how much of them that is."""
-    count = sum(share > 0 for share in left_out["shares"])
-    return ("1 photo shows" if count == 1 else f"{count} photos show"), left_out_line(left_out)
+def _told(left_out: dict[str, list[float]], names: tuple[str, ...]) -> list[str]:
+    """Which photos show what others do not, and how much of them that is; nothing of none."""
+    count, line = sum(share > 0 for share in left_out.get("shares", ())), left_out_line(left_out, names)
+    if count < 2:
+        return [_LEFT_OUT.format(line)] if count else []
+    return [_LEFT_OUT_OF_SOME.format(count, line)]
 
 
 def _coloured(scene: Scene, photos: _Silent, light: Light, progress: Callable[[float], None]) -> Scene:

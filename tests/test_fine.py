@@ -9,7 +9,7 @@ from torch.nn import functional as F
 
 from langflash_core.detail import DETAILS
 from langflash_core.errors import InputError
-from langflash_core.fine import coloured_scene, covered_scene
+from langflash_core.fine import _told, coloured_scene, covered_scene
 from langflash_core.images.views import source_pictures
 from langflash_core.scene.checks import check_scene
 from langflash_core.scene.detailed import assemble_detailed
@@ -214,11 +214,17 @@ def test_somebody_before_one_photo_leaves_no_trace_in_the_scene():
     shares = scene.record.left_out["shares"]
     assert [share > 0 for share in shares] == [False, False, True, False]
     said = [warning for warning in scene.record.warnings if "left out" in warning]
-    here = f"{round(100 * shares[2])} % of photo 3"
+    here = f"{round(100 * shares[2])} % of {given.views.names[2]}"
     assert said == [f"1 photo shows something that the others do not ({here}); it is left out"]
     drawn = render(scene, scene.camera(2, 120, 90), weight_maps=False).rgb.movedim(-1, 0)
     behind = light.corrected(given.photos[2], view=2)[:, 15:81, 6:36]
     assert float((drawn[:, 15:81, 6:36] - behind).abs().mean()) < 0.05  # .4 with somebody there
+
+
+def test_what_several_photos_show_alone_is_said_in_number_and_by_name():
+    said = _told({"shares": [0.42, 0.0, 0.16]}, ("a.jpg", "b.jpg", "c.jpg"))
+    shown = "2 photos show things that the others do not (42 % of a.jpg, 16 % of c.jpg)"
+    assert said == [f"{shown}; those things are left out"] and _told({}, ("a.jpg",)) == []
 
 
 def test_of_two_photos_nothing_is_left_out():

@@ -109,8 +109,8 @@ def identical_notes(names: Sequence[str], images: Sequence[Tensor]) -> list[str]
         for earlier in range(later):
             if float((images[later] - images[earlier]).abs().mean()) < SAME_DIFFERENCE:
                 notes.append(
-                    f"photos {earlier + 1} ({names[earlier]}) and {later + 1} ({names[later]}) show the same "
-                    "picture; take them from places a step apart"
+                    f"{names[earlier]} and {names[later]} show the same picture; "
+                    "take them from places a step apart"
                 )
                 break
     if len(notes) <= ALIKE_ONE_BY_ONE:

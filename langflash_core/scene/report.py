@@ -1,6 +1,6 @@
 """What `langflash info` says about a scene: plain JSON values. A scene file is described without torch."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -17,6 +17,7 @@ if TYPE_CHECKING:
 _CORE = (0.01, 0.99)  # the middle 98 % along each axis: stray points do not stretch the box
 _PHOTO = "photo_"
 _NAMED = 4  # photos, of which it is said what was left out
+_SHORT = 40  # letters, up to which names of photos are read; else photos are numbered
 
 
 def describe(scene: "Scene") -> dict:
@@ -52,25 +53,31 @@ def describe_file(path: Path) -> dict:
         raise damaged(path, error) from error
 
 
-def detail_line(detail: Mapping[str, Any]) -> str:
+def detail_line(detail: Mapping[str, Any], now: int | None = None) -> str:
     """What a scene's detail was spent on and what it bought, for people; "" where nothing is known.
 
     Args:
         detail: as `Record` has it: level (a name), elements, coarse, fine (counts), by_size (counts by the
             side of an element, pixels of the photo), photos_psnr_db and plain_psnr_db (a number a photo,
             of this scene and of one Gaussian a pixel). What is missing, or is something else, is left out.
+        now: Gaussians of the scene, beside which the line stands: it says that its own are those that were
+            made, where some of them went since. None: it stands alone.
     """
     level = detail.get("level")
-    spent = _joined(", ", level if isinstance(level, str) else "", _elements(detail))
+    spent = _joined(", ", level if isinstance(level, str) else "", _elements(detail, now))
     return _joined(" · ", spent, _bought(detail))
 
 
-def _elements(detail: Mapping[str, Any]) -> str:
+def _elements(detail: Mapping[str, Any], now: int | None) -> str:
     stored = detail.get("by_size")
     by_size = stored if isinstance(stored, Mapping) else {}
-    total = f"{n} Gaussians" if (n := _count(detail.get("elements"))) else ""
+    made = "" if now is None or now == detail.get("elements") else " made"
+    total = f"{n} Gaussians{made}" if (n := _count(detail.get("elements"))) else ""
     kinds = (f"{n} {kind}" for kind in ("coarse", "fine") if (n := _count(detail.get(kind))))
-    sizes = (f"{side} px {n}" for side, value in by_size.items() if (n := _count(value)))
+    sizes = [f"{side} px {n}" for side, value in by_size.items() if (n := _count(value))]
+    if total and sizes and len(sizes) == len(by_size):  # what goes on under finer ones is of no size
+        rest = detail["elements"] - sum(by_size.values())
+        sizes += [f"behind others {rest:,}"] if rest > 0 else []
     parts = _joined("; ", _joined(", ", *kinds), _joined(", ", *sizes))
     return _joined(" ", total, f"({parts})" if parts else "")
 
@@ -97,15 +104,16 @@ def lens_line(lens: Mapping[str, Any]) -> str:
         return ""
 
 
-def left_out_line(left_out: Mapping[str, Any]) -> str:
+def left_out_line(left_out: Mapping[str, Any], names: Sequence[str] = ()) -> str:
     """What was left out of photos since the others do not show it, photos that could not be placed, and what
-    became of films' frames, for people: "6 % of photo 3"; "" of nothing, and where something else is said.
+    became of films' frames, for people: "6 % of sofa.jpg"; "" of nothing, and where something else is said.
 
     Args:
-        left_out: as `Record` has it.
+        left_out: as `Record` has it. names: of the photos; without, and where two are the same, photos
+            are numbered.
     """
     films = (said.rstrip(".") for said in film_sentences(left_out))
-    return _joined("; ", _shares_line(left_out_shares(left_out)), _unplaced(left_out), *films)
+    return _joined("; ", _shares_line(left_out_shares(left_out), names), _unplaced(left_out), *films)
 
 
 def left_out_shares(left_out: Mapping[str, Any]) -> tuple[float, ...]:
@@ -143,15 +151,21 @@ def _is_text(value: object) -> bool:
 
 def _unplaced(left_out: Mapping[str, Any]) -> str:
     names = unplaced_names(left_out)
-    more = f" and {len(names) - _NAMED} others" if len(names) > _NAMED else ""
+    more = f" and {_others(len(names) - _NAMED)}" if len(names) > _NAMED else ""
     return f"{', '.join(names[:_NAMED])}{more} could not be placed" if names else ""
 
 
-def _shares_line(shares: tuple[float, ...]) -> str:
-    some = [(share, number) for number, share in enumerate(shares, 1) if share > 0]
+def _shares_line(shares: tuple[float, ...], names: Sequence[str]) -> str:
+    some = [(share, view) for view, share in enumerate(shares) if share > 0]
     most = sorted(sorted(some, reverse=True)[:_NAMED], key=lambda one: one[1])
-    parts = [f"{max(1, round(100 * share))} % of photo {number}" for share, number in most]
-    return ", ".join(parts) + (f" and some of {len(some) - _NAMED} others" if len(some) > _NAMED else "")
+    apart = len(names) == len(set(names)) == len(shares) and all(0 < len(name) <= _SHORT for name in names)
+    called = names if apart else [f"photo {view}" for view in range(len(shares))]
+    parts = [f"{max(1, round(100 * share))} % of {called[view]}" for share, view in most]
+    return ", ".join(parts) + (f" and some of {_others(len(some) - _NAMED)}" if len(some) > _NAMED else "")
+
+
+def _others(count: int) -> str:
+    return "another one" if count == 1 else f"{count} others"
 
 
 def world_line(world: World | None, metric_scale: float | None = None) -> str:

@@ -58,15 +58,34 @@ def _described(path: Path) -> dict[str, Any]:
 
 
 def _for_people(document: dict[str, Any]) -> dict[str, Any]:
-    """With detail, lens, world and what was left out as a line each, none where there is nothing to say."""
+    """With detail, lens, world and what was left out as a line each, none where there is nothing to say; with
+    what pruning changed; without timings, where nobody knows them."""
     from langflash_core.records import world_from_json
     from langflash_core.scene.report import detail_line, left_out_line, lens_line, world_line
 
-    says = {"detail": detail_line, "lens": lens_line, "left_out": left_out_line}
-    lines = {name: line(document[name] or {}) for name, line in says.items()}
+    lines = {
+        "detail": detail_line(document["detail"] or {}, document["gaussians"]),
+        "lens": lens_line(document["lens"] or {}),
+        "left_out": left_out_line(document["left_out"] or {}, document["photos"]),
+        "timings": document["timings"] or "",
+        "pruning": _pruned(document["pruning"]),
+    }
     world = world_from_json(document["world"]) if document["world"] else None
     lines["world"] = world_line(world, document["metric_scale"])
     return {name: lines.get(name, value) for name, value in document.items() if lines.get(name) != ""}
+
+
+def _pruned(report: dict[str, Any] | None) -> dict[str, Any] | None:
+    """What pruning changed: numbers that are 0, or the same before and after, say nothing."""
+    if report is None:
+        return None
+    changed = {}
+    for name, value in report.items():
+        what, _, when = name.rpartition("_")
+        other = {"before": "after", "after": "before"}.get(when)
+        if value not in (0, None) and (other is None or value != report.get(f"{what}_{other}")):
+            changed[name.replace("weights_", "weights_above_0_")] = value
+    return changed
 
 
 def _in_words(fields: dict[str, Any]) -> dict[str, Any]:

@@ -282,6 +282,24 @@ def test_info(run, scene_file):
     assert document["views"] == 2 and document["file_bytes"] == scene_file.stat().st_size
     text = run("info", scene_file).out
     assert f"gaussians: {WIDTH * HEIGHT:,}" in text and "space: minilm" in text
+    assert document["timings"] is None and "timings" not in text
+
+
+def test_info_says_of_pruning_what_it_changed(run, scene_file, tmp_path):
+    report = {"gaussians_before": 9, "faint": 2, "merged": 0, "gaussians_after": 7, "weights_before": 20}
+    report |= {"weights_after": 9_000, "bytes_before": 70, "bytes_after": 70}
+    path = tmp_path / "pruned.langflash"
+    langflash_core.save(langflash_core.load(scene_file).with_record(pruning=report), path)
+    assert run("info", path, "--json").json()["pruning"] == report
+    lines = run("info", path).out.split("pruning:\n")[1].splitlines()
+    said = [line.strip() for line in lines if line.startswith("  ")]
+    assert said == [
+        "gaussians before: 9",
+        "faint: 2",
+        "gaussians after: 7",
+        "weights above 0 before: 20",
+        "weights above 0 after: 9,000",
+    ]
 
 
 def test_info_tells_a_light_that_shows(run, scene_file, tmp_path):
