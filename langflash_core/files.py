@@ -228,31 +228,37 @@ def readable_file(path: Path, what: str, error: type[InputError]) -> Path:
     return path
 
 
-def check_folder(folder: Path) -> None:
+def check_folder(folder: Path, option: str = "-o") -> None:
     """Prove that a file can be made in `folder`, or in the nearest parent that exists.
+
+    Args:
+        option: that named it.
 
     Raises:
         OutputError: it cannot; nothing is left behind either way.
     """
     nearest = _nearest(folder)
     if not nearest.is_dir():
-        raise OutputError(f"cannot write to {folder}: {nearest} is not a folder; choose another -o")
+        raise OutputError(f"cannot write to {folder}: {nearest} is not a folder; choose another {option}")
     import tempfile
 
     try:
         tempfile.TemporaryFile(dir=nearest).close()
     except OSError as problem:
         raise OutputError(
-            f"cannot write to {folder}: {problem.strerror or problem}; choose another -o"
+            f"cannot write to {folder}: {problem.strerror or problem}; choose another {option}"
         ) from None
 
 
-def check_output_file(path: Path, suffixes: tuple[str, ...] = (), inputs: Iterable[Path] = ()) -> Path:
+def check_output_file(
+    path: Path, suffixes: tuple[str, ...] = (), inputs: Iterable[Path] = (), option: str = "-o"
+) -> Path:
     """`path`, when one file can be written there without harm.
 
     Args:
         suffixes: lower-case endings that are allowed, any when empty.
         inputs: files the command reads, which it must not overwrite.
+        option: that named it.
 
     Raises:
         OutputError: wrong ending, a folder, an input of the same command, or not writable.
@@ -260,10 +266,11 @@ def check_output_file(path: Path, suffixes: tuple[str, ...] = (), inputs: Iterab
     if path.is_dir():
         raise OutputError(f"cannot write {path}: it is a folder; give a file name")
     if any(path.exists() and other.exists() and path.samefile(other) for other in inputs):
-        raise OutputError(f"{path} is also an input; choose another -o")
+        raise OutputError(f"{path} is also an input; choose another {option}")
     if suffixes and kind_of(path) not in suffixes:
-        raise OutputError(f"cannot write {path.name}: this command writes {', '.join(suffixes)}; rename -o")
-    check_folder(path.parent)
+        wanted = f"this command writes {', '.join(suffixes)}"
+        raise OutputError(f"cannot write {path.name}: {wanted}; rename {option}")
+    check_folder(path.parent, option)
     return path
 
 

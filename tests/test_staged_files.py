@@ -98,12 +98,16 @@ def test_output_file(tmp_path):
     assert check_output_file(tmp_path / "new" / "A.PNG", (".png",)) == tmp_path / "new" / "A.PNG"
     with pytest.raises(OutputError, match=r"\.png"):
         check_output_file(tmp_path / "a.jpg", (".png",))
+    with pytest.raises(OutputError, match="rename --sheet"):
+        check_output_file(tmp_path / "a.jpg", (".png",), option="--sheet")
     with pytest.raises(OutputError, match="folder"):
         check_output_file(tmp_path)
     photo = tmp_path / "a.jpg"
     photo.write_bytes(b"")
     with pytest.raises(OutputError, match="also an input"):
         check_output_file(tmp_path / "." / "a.jpg", inputs=[Path("elsewhere"), photo])
+    with pytest.raises(OutputError, match="not a folder; choose another --sheet"):
+        check_output_file(photo / "a.jpg", option="--sheet")
     assert os.listdir(tmp_path) == ["a.jpg"]
 
 

@@ -38,9 +38,11 @@ def run(args: Namespace, out: TextIO) -> None:
     recipe = _recipe(args)
     checked_scene(args.scene)
     check_output_file(args.output, (".langflash",), inputs=[args.scene])
-    for path, suffix in ((args.preview, ".png"), (args.save_recipe, ".json")):
+    taken = [args.scene, args.output, *filter(None, [args.recipe])]
+    asked = ((args.preview, ".png", "--preview"), (args.save_recipe, ".json", "--save-recipe"))
+    for path, suffix, option in asked:
         if path is not None:
-            check_output_file(path, (suffix,), inputs=[args.scene, args.output, *filter(None, [args.recipe])])
+            check_output_file(path, (suffix,), inputs=taken, option=option)
 
     from langflash_core.export.paint import write_picture
     from langflash_core.mending.cleaning import cleaned

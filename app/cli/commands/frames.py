@@ -69,7 +69,7 @@ def _check_output(args: Namespace) -> None:
             raise OutputError(f"{folder} holds other files, such as {foreign[0]}; name a new or empty folder")
     check_folder(folder.absolute().parent)
     if args.sheet is not None:
-        check_output_file(args.sheet, (".png", ".jpg", ".jpeg"), inputs=(args.film,))
+        check_output_file(args.sheet, (".png", ".jpg", ".jpeg"), inputs=(args.film,), option="--sheet")
 
 
 def _document(folder: Path, strip: Strip, choice: Choice) -> dict[str, Any]:

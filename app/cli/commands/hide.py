@@ -29,7 +29,7 @@ def run(args: Namespace, out: TextIO) -> None:
     checked_scene(args.scene)
     check_output_file(args.output, (".langflash",), inputs=[args.scene])
     if args.preview is not None:
-        check_output_file(args.preview, (".png",), inputs=[args.scene, args.output])
+        check_output_file(args.preview, (".png",), inputs=[args.scene, args.output], option="--preview")
 
     import torch
 

@@ -153,7 +153,7 @@ def _stretches(args: Namespace, folder: PhotoFolder, out: TextIO) -> None:
 def _calibrate(args: Namespace, out: TextIO) -> None:
     _check_cache(args)
     if args.plot is not None:
-        check_output_file(args.plot, (".png",))
+        check_output_file(args.plot, (".png",), option="--plot")
     from langflash_core.lab.evaluation.calibration import calibration, photos_asked, rooms_asked
 
     network = load_network(args.preset, args.weights)

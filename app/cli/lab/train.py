@@ -267,7 +267,7 @@ def _run(args: Namespace, out: TextIO) -> None:
 def _source(args: Namespace) -> SceneSource:
     if not args.scenes.is_dir():
         raise InputError(f"there is no folder {args.scenes}; give a data set as it was unpacked")
-    check_folder(args.cache)
+    check_folder(args.cache, "CACHE")
     args.cache.mkdir(parents=True, exist_ok=True)
     return source_at(args.scenes, args.labels)
 

@@ -58,7 +58,8 @@ def test_the_folder_is_replaced_and_nothing_else_is(run, walk: Path, tmp_path: P
     refused = run("frames", walk, "-o", out)
     assert refused.code == 2 and "diary.txt" in refused.err and len(list(out.iterdir())) == 5
     assert run("frames", walk, "-o", walk).code == 2
-    assert run("frames", walk, "-o", tmp_path / "other", "--sheet", tmp_path / "sheet.txt").code == 2
+    refused = run("frames", walk, "-o", tmp_path / "other", "--sheet", tmp_path / "sheet.txt")
+    assert refused.code == 2 and refused.err.endswith("; rename --sheet\n")
     assert not (tmp_path / "other").exists()
 
 

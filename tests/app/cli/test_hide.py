@@ -74,7 +74,7 @@ def test_no_small_picture_of_recent_scenes_shows_it_any_more(
         (("armchair", "--how", "remove", "--blocks", "4"), "leave --blocks out"),
         (("armchair", "--open"), "leave --open out"),
         (("armchair", "--margin", "2"), "from 0 to 1"),
-        (("armchair", "--preview", "p.txt"), "p.txt"),
+        (("armchair", "--preview", "p.txt"), "rename --preview"),
     ],
 )
 def test_bad_words_write_nothing(run, scene_file, tmp_path, words, said):

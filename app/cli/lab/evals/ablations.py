@@ -20,7 +20,7 @@ def ablations(args: Namespace, out: TextIO) -> None:
     if args.output is not None:
         check_output_file(args.output, (".md",))
     if args.work is not None:
-        check_folder(args.work)
+        check_folder(args.work, "--work")
     from langflash_core.lab.evaluation.ablations.study import Tally, room_studies
     from langflash_core.lab.evaluation.ablations.tables import ablation_markdown, summary
     from langflash_core.lab.evaluation.tallies import Shelf, identity, intervals, merged

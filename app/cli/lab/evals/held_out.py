@@ -17,7 +17,7 @@ def held_out(args: Namespace, rooms: int) -> tuple[Pack, range]:
     if args.output is not None:
         check_output_file(args.output, (".md",))
     if args.keep is not None:
-        check_folder(args.keep)
+        check_folder(args.keep, "--keep")
     pack = load_pack(readable_file(args.pack, "furniture pack", InputError))
     first = HELD_OUT_SEED if args.first_seed is None else args.first_seed
     return pack, range(first, first + (args.limit or rooms))

@@ -30,7 +30,7 @@ def labels(args: Namespace, out: TextIO) -> None:
     if args.output is not None:
         check_output_file(args.output, (".md",))
     if args.results is not None:
-        check_folder(args.results)
+        check_folder(args.results, "--results")
     order = ordered(args)
     pack = load_pack(readable_file(args.pack, "furniture pack", InputError))
     maker, judgements = LabelMaker(order), []

@@ -28,7 +28,7 @@ def protocol(args: Namespace, out: TextIO) -> None:
     if args.output is not None:
         check_output_file(args.output, (".md",))
     if args.work is not None:
-        check_folder(args.work)
+        check_folder(args.work, "--work")
     if args.name == "nyu":
         _nyu(args, out)
         return

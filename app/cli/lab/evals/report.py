@@ -54,9 +54,9 @@ def report(args: Namespace, out: TextIO) -> None:
     judges = plans(_sources(args))
     if not judges and args.scene is None:
         raise InputError("there is nothing to judge; give --rooms, --pack, --posed, --photos or --scene")
-    for folder in (args.output, args.small):
+    for folder, option in ((args.output, "-o"), (args.small, "--small")):
         if folder is not None:
-            check_folder(folder)
+            check_folder(folder, option)
     with ProgressBar() as progress:
         drawn = [] if args.scene is None else [_drawing(args.scene, progress)]  # while nothing else runs
         with open_renderer(args.backend) as renderer:

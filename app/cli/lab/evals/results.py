@@ -79,7 +79,7 @@ def check_files(args: Namespace) -> None:
     if args.output is not None:
         check_output_file(args.output, (".md",))
     if args.sheet is not None:
-        check_output_file(args.sheet, (".png",))
+        check_output_file(args.sheet, (".png",), option="--sheet")
 
 
 def write_sheet(path: Path, sheet: Image.Image) -> None:

@@ -59,9 +59,9 @@ def _check(args: Namespace) -> None:
     if sum((bool(args.photos), args.folder is not None, args.pack is not None)) > 1:
         raise InputError("give photos, a folder with --posed, or furniture with --pack; not two of them")
     check_files(args)
-    for folder in (args.results, args.keep):
+    for folder, option in ((args.results, "--results"), (args.keep, "--keep")):
         if folder is not None:
-            check_folder(folder)
+            check_folder(folder, option)
     if args.beside is not None and not args.beside.is_dir():
         raise SceneFileError(f"there is no folder {args.beside}; make it with --keep, and give that of a way")
 

@@ -50,7 +50,7 @@ def sides(args: Namespace, out: TextIO) -> None:
         raise InputError("rooms are drawn at the network's own size; leave --size out, or judge --posed")
     check_files(args)
     if args.results is not None:
-        check_folder(args.results)
+        check_folder(args.results, "--results")
     if args.sheet is not None and (args.results is None or args.pack is None):
         raise InputError("--sheet shows what --results keeps of rooms; give a furniture pack and --results")
     from langflash_core.lab.evaluation.lpips import Lpips

@@ -92,9 +92,9 @@ def _check(args: Namespace) -> None:
         )
     check_files(args)
     if args.results is not None:
-        check_folder(args.results)
+        check_folder(args.results, "--results")
     if args.plot is not None:
-        check_output_file(args.plot, (".png",))
+        check_output_file(args.plot, (".png",), option="--plot")
         if find_spec("matplotlib") is None:
             raise InputError("--plot needs matplotlib; pip install 'langflash[bench]' brings it")
     if args.sheet is not None and args.results is None:
