@@ -275,7 +275,9 @@ def _minimum(pairs: Pairs, num_views: int) -> Light:
         normal, right = _normal_equations(pairs, found.view(3, num_views, 2), sigma)
         normal = gauge @ normal @ gauge + prior.diag()
         right = (gauge @ right[..., None])[..., 0] - prior * found
-        found = found + torch.linalg.solve(normal, right)
+        # One after the other: with several threads torch hangs or fails on a batch of large ones (its issue
+        # 142815), of 96 photos and more.
+        found = found + torch.stack([torch.linalg.solve(*own) for own in zip(normal, right, strict=True)])
     logs, offsets = _bounded(found.view(3, num_views, 2), connected).unbind(-1)
     return Light(logs.exp().T.contiguous(), offsets.T.contiguous())
 

@@ -17,6 +17,7 @@ from scipy.optimize import least_squares
 from langflash_core.scene import light as module
 from langflash_core.scene.light import GAIN_RANGE, Light, Pairs, compared, light_of, partners, photo_light
 from tests.scene.plane import wall_prediction
+from tests.torch_threads import torch_threads
 
 WIDTH, HEIGHT = 112, 84
 FAST = 0.05  # seconds of processor time for two photos
@@ -275,6 +276,22 @@ def test_a_chain_of_eight():
     after = found.corrected(changed)
     before, left = ((v[:-1, ..., 80:] - v[1:, ..., : WIDTH - 80]).abs().mean() for v in (changed, after))
     assert left < 0.25 * before
+
+
+def test_a_hundred_photos_by_several_threads():
+    """Of which torch 2.13 fails on a batch of matrices, or hangs."""
+    count = 100
+    firsts = torch.arange(count - 1)
+    own = torch.rand(count - 1, 3, 64, dtype=torch.float64, generator=torch.Generator().manual_seed(0))
+    pairs = Pairs(firsts, firsts + 1, own, 0.9 * own, torch.ones_like(own, dtype=torch.bool))
+    found = []
+    for threads in (1, 2):
+        with torch_threads(threads):
+            found.append(light_of(pairs, count))
+    # Sums of float64 in another order, times the condition of the matrix, some 1e4.
+    assert torch.allclose(found[0].gains, found[1].gains, rtol=0, atol=1e-10)
+    assert torch.allclose(found[0].offsets, found[1].offsets, rtol=0, atol=1e-10)
+    assert float((found[0].gains - 1).abs().max()) > 0.01
 
 
 def test_two_groups_of_photos_have_a_light_each():
