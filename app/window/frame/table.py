@@ -152,6 +152,8 @@ def _files() -> Iterable[Entry]:
     yield Entry("Back to the room before", group, _room_before)
     yield Entry("Pause the reconstruction", group, _pause)
     yield Entry("Cancel the reconstruction", group, lambda s: show.CancelJob() if s.scene.job else None)
+    yield Entry("Keep the two photos that make the best scene together", group, _pair)
+    yield Entry("Put photos back that were taken out", group, _photos_back)
     yield Entry(
         "Clear the tray", group, lambda s: show.ClearPhotos() if s.scene.photos and not s.scene.job else None
     )
@@ -163,6 +165,15 @@ def _files() -> Iterable[Entry]:
 def _frames(state: State) -> do.Command | None:
     free = state.opening.film is not None and state.scene.job is None
     return do.ShowDialog(Dialog.FILM) if free else None
+
+
+def _pair(state: State) -> do.Command | None:
+    scene = state.scene
+    return show.ChoosePair() if len(scene.photos) > 2 and scene.job is None and not scene.choosing else None
+
+
+def _photos_back(state: State) -> do.Command | None:
+    return show.PutPhotosBack() if state.scene.num_taken_out and not state.scene.choosing else None
 
 
 def _pause(state: State) -> do.Command | None:
@@ -367,9 +378,13 @@ def _placing(command: do.Command) -> Callable[[State], do.Command | None]:
 
 
 def _undo(state: State) -> do.Command | None:
-    if state.editing.history and state.editing.history.done:
+    """Of what was done last: photos come back before edits that are older."""
+    back, taken, history = _photos_back(state), state.scene.taken_out, state.editing.history
+    if taken is not None and taken.history is history and back is not None:
+        return back
+    if history and history.done:
         return edit.Undo()
-    return mending.BringBack() if state.scene.unhidden is not None else None
+    return mending.BringBack() if state.scene.unhidden is not None else back
 
 
 def _redo(state: State) -> do.Command | None:

@@ -14,6 +14,9 @@ NO_KEYS = imgui.WindowFlags_.no_nav  # for windows that Tab and the arrows pass 
 _Value = TypeVar("_Value")
 _FOLDER = 1.3  # of a frame's height: the icon is wider than high
 _WIDEST = 26.0  # of a line of a tooltip, in sizes of the font
+_NEW_SECONDS, _NEW_FRAMES = 0.5, 3
+"""Of what has come in the place of something else: a double click takes no longer, however slow frames are; a
+window that then rests draws no fewer."""
 
 
 @contextmanager
@@ -127,6 +130,23 @@ def quiet_button(label: str, tip: str = "") -> bool:
         pressed = imgui.button(label)
     tooltip(tip)
     return pressed
+
+
+def takes_clicks(name: str) -> bool:
+    """Whether the items just drawn under this name take the click that ends now: not where it began as they
+    had only just come, since it may be the second of a double click on what was in their place."""
+    storage, frame, now = imgui.get_state_storage(), imgui.get_frame_count(), imgui.get_time()
+    drawn, first, since, early = (
+        imgui.get_id(f"{what} of {name}") for what in ("drawn", "first", "since", "early")
+    )
+    if storage.get_int(drawn, -2) < frame - 1:
+        storage.set_int(first, frame)
+        storage.set_float(since, now)
+    storage.set_int(drawn, frame)
+    if imgui.is_mouse_clicked(0):
+        new = now - storage.get_float(since) < _NEW_SECONDS or frame - storage.get_int(first) < _NEW_FRAMES
+        storage.set_bool(early, new)
+    return not (storage.get_bool(early) and imgui.is_mouse_released(0))
 
 
 def folder_room() -> float:

@@ -4,7 +4,16 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from langflash_core.errors import FilmError
-from langflash_core.images.strip import Strip, choose, notes_on
+from langflash_core.images.strip import (
+    BLURRED,
+    REPEAT,
+    SMEARED,
+    Choice,
+    Still,
+    Strip,
+    choose,
+    notes_on,
+)
 
 from ..commands import Notify, ShowDialog
 from ..dialogs import Dialog
@@ -200,7 +209,18 @@ def proposed(path: Path, strip: Strip, most: int, fewest: int = 2) -> Film:
         FilmError: it has none to take.
     """
     choice = choose(strip, most, fewest)
-    return Film(path, strip, choice.chosen, tuple(choice.left.items()), notes_on(strip, choice))
+    reasons = tuple(_reason(still, choice, index) for index, still in enumerate(strip.stills))
+    left, notes = tuple(choice.left.items()), notes_on(strip, choice)
+    return Film(path, strip, choice.chosen, left, notes, choice.chosen, reasons)
+
+
+def _reason(still: Still, choice: Choice, index: int) -> str:
+    """Why a still is left out where it is, a key of `REASONS`."""
+    if still.why_not:
+        return "repeats" if still.why_not == REPEAT else "other_shots"
+    if choice.until is not None and still.seconds > choice.until:
+        return "beyond"
+    return "blurred" if choice.relative[index] < BLURRED or still.smear > SMEARED else "between"
 
 
 def room_for_frames(state: State) -> int:

@@ -28,13 +28,29 @@ class Folder:
 @dataclass(frozen=True)
 class Film:
     """A film that was looked through. chosen: indices of its stills, in order. left: frames left out, by
-    reason, of the choice that was proposed. notes: sentences."""
+    reason, of the choice that was `proposed`. notes: sentences. reasons: why each still is left out where it
+    is."""
 
     path: Path
     strip: Strip
     chosen: tuple[int, ...]
     left: tuple[tuple[str, int], ...] = ()
     notes: tuple[str, ...] = ()
+    proposed: tuple[int, ...] = ()
+    reasons: tuple[str, ...] = ()
+
+    @property
+    def left_out(self) -> dict[str, int]:
+        """Frames left out now, by reason; together with the chosen ones all that were looked at."""
+        left, before, now = dict(self.left), set(self.proposed), set(self.chosen)
+        for index in before - now:
+            left[self.reasons[index]] = left.get(self.reasons[index], 0) + 1
+        for index in sorted(now - before):
+            why = self.reasons[index]
+            if not left.get(why):  # a still as blurred as others that was proposed for lack of these
+                why = "between" if left.get("between") else max(left, key=lambda key: left[key])
+            left[why] -= 1
+        return left
 
     @property
     def frames(self) -> tuple[Path, ...]:
@@ -61,7 +77,7 @@ NO_OPENING = Opening()
 
 def told_film(film: Film) -> dict:
     """What a scene's record says of frames that were not taken, as `Record.left_out` has it."""
-    why = {REASONS[key]: count for key, count in film.left if count}
+    why = {REASONS[key]: count for key, count in film.left_out.items() if count}
     return {"film": film.strip.film, "frames": film.strip.looked, "why": why}
 
 

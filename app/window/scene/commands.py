@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from langflash_core.geometry import poses, rotations
+from langflash_core.images.still_names import shown_name
 from langflash_core.scene.edits import Marks, delete, deny_atom
 from langflash_core.scene.mask import Mask
 
@@ -18,7 +19,19 @@ from ..filming.state import NO_FILMING
 from ..state import State
 from .drops import MAX_PHOTOS
 from .memory import SceneMemory
-from .state import MOST_ROOMS, PAUSED, RECONSTRUCTING, RESTORING, Job, Photo, Room, SceneInfo, head_of
+from .state import (
+    MOMENTS,
+    MOST_ROOMS,
+    PAUSED,
+    RECONSTRUCTING,
+    RESTORING,
+    Job,
+    Photo,
+    Room,
+    SceneInfo,
+    TakenOut,
+    head_of,
+)
 from .unfinished import FEWEST
 
 if TYPE_CHECKING:
@@ -55,9 +68,8 @@ class RemovePhoto:
     index: int
 
     def apply(self, state: State) -> State:
-        return state.with_scene(
-            photos=state.scene.photos[: self.index] + state.scene.photos[self.index + 1 :]
-        )
+        photos = state.scene.photos
+        return _with_fewer(state, photos[: self.index] + photos[self.index + 1 :])
 
 
 @dataclass(frozen=True)
@@ -65,7 +77,32 @@ class ClearPhotos:
     """Empty the tray; the scene stays."""
 
     def apply(self, state: State) -> State:
-        return state.with_scene(photos=())
+        return _with_fewer(state, ())
+
+
+def _with_fewer(state: State, photos: tuple[Photo, ...]) -> State:
+    """These photos of the tray alone; the others can be put back."""
+    old = state.scene
+    if len(photos) == len(old.photos):
+        return state
+    before = old.taken_out if old.num_taken_out else None
+    left = tuple(photo.path for photo in photos)
+    return state.with_scene(
+        photos=photos, taken_out=TakenOut(old.photos, left, state.editing.history, before)
+    )
+
+
+@dataclass(frozen=True)
+class PutPhotosBack:
+    """The tray as it was before photos were last taken out of it."""
+
+    def apply(self, state: State) -> State:
+        taken = state.scene.taken_out
+        if taken is None or not state.scene.num_taken_out:
+            return state
+        here = {photo.path: photo for photo in state.scene.photos}
+        photos = tuple(here.get(photo.path, photo) for photo in taken.photos)
+        return state.with_scene(photos=photos, taken_out=taken.before)
 
 
 @dataclass(frozen=True)
@@ -143,7 +180,7 @@ class ChoosePair:
 
 @dataclass(frozen=True)
 class PairChosen:
-    """The best pair of `paths`, or none; the others leave the tray."""
+    """The best pair of `paths`, or none; the others leave the tray, and can be put back."""
 
     paths: tuple[Path, ...]
     pair: tuple[int, int] | None
@@ -156,8 +193,9 @@ class PairChosen:
             text = "No two of these photos match; take photos that share at least a third of the picture."
             return Notify(text).apply(state)
         chosen = tuple(state.scene.photos[index] for index in self.pair)
-        names = " and ".join(photo.path.name for photo in chosen)
-        return Notify(f"Kept {names}.", "info").apply(state.with_scene(photos=chosen))
+        names, others = " and ".join(shown_name(photo.path.name) for photo in chosen), len(self.paths) - 2
+        text = f"Kept {names}. Ctrl+Z puts the other {'one' if others == 1 else others} back."
+        return Notify(text, "info").apply(_with_fewer(state, chosen))
 
 
 @dataclass(frozen=True)
@@ -181,7 +219,8 @@ class Reconstruct:
         if not state.scene.photos:
             return Notify("There is no photo to reconstruct; drop two photos on the window.").apply(state)
         pausable = len(state.scene.photos) >= FEWEST
-        job = Job(RECONSTRUCTING, "starting", started=state.now, pausable=pausable)
+        resumed = pausable and state.scene.goes_on
+        job = Job(RECONSTRUCTING, "starting", started=state.now, pausable=pausable, resumed=resumed)
         return state.with_scene(job=job, unfinished=())
 
 
@@ -265,6 +304,7 @@ class SceneArrived:
                 old,
                 info=info,
                 photos=() if self.alone else old.photos,
+                taken_out=old.taken_out if made or self.replaces else None,
                 aside=None,
                 pose=start,
                 flight=None,
@@ -509,11 +549,15 @@ class SceneSaved:
 
 @dataclass(frozen=True)
 class CancelJob:
-    """Ask the job to stop; it ends after its present stage."""
+    """Ask the job to stop; it ends after its present stage. What was resumed moments ago is paused again:
+    nobody means to lose at once what they kept."""
 
     def apply(self, state: State) -> State:
         job = state.scene.job
-        return state if job is None else state.with_scene(job=replace(job, cancelling=True))
+        if job is None:
+            return state
+        pausing = job.pausing or (job.resumed and job.age(state.now) < MOMENTS)
+        return state.with_scene(job=replace(job, cancelling=True, pausing=pausing))
 
 
 @dataclass(frozen=True)

@@ -96,7 +96,7 @@ class SceneEffects(Effects):
                 info = state.scene.info
                 submit(FindWorld(info.serial, info.memory, state.editing.marks))
             case CancelJob() | PauseJob():
-                self._end_job(command, before)
+                self._end_job(state)
             case ChoosePair() if state.scene.choosing and not before.scene.choosing:
                 submit(FindPair(tuple(photo.path for photo in state.scene.photos)))
             case SceneArrived(info, replaces=changed):
@@ -113,12 +113,12 @@ class SceneEffects(Effects):
         self._look_for_work(before, state)
         self._show_whole(before, state)
 
-    def _end_job(self, command: CancelJob | PauseJob, before: State) -> None:
+    def _end_job(self, state: State) -> None:
         """A job that is paused keeps its work, one that is cancelled does not."""
         self._hands.cancel()
-        job = before.scene.job
-        if isinstance(command, CancelJob) and job is not None and job.pausable:
-            self._hands.submit(DropWork(_paths(before)))
+        job = state.scene.job
+        if job is not None and job.pausable and not job.pausing:
+            self._hands.submit(DropWork(_paths(state)))
 
     def _look_for_work(self, before: State, state: State) -> None:
         """Other photos in the tray may be ones on which work was begun."""

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING
 from langflash_core import pictures
 from langflash_core.geometry.poses import START, Pose, Vector
 from langflash_core.pictures import Picture
+from langflash_core.records import FoundLens
 from langflash_core.scene.edits import History, Marks
 
 from ..protocol import Command
@@ -48,9 +49,23 @@ class Photo:
     notes: tuple[str, ...] = ()
 
 
+@dataclass(frozen=True)
+class TakenOut:
+    """The tray before photos were taken out of it. left: those that stayed. history: the scene's edits by
+    then. before: the same of what was taken out earlier."""
+
+    photos: tuple[Photo, ...]
+    left: tuple[Path, ...]
+    history: "History | None" = field(default=None, compare=False, repr=False)
+    before: "TakenOut | None" = field(default=None, repr=False)
+
+
 PAUSED = "Paused. Resume goes on from there, also when the program was closed and the same photos are opened."
 RECONSTRUCTING, RESTORING = "Reconstructing", "Restoring"
 """Titles of the jobs that make a scene out of the tray, and out of what an earlier session kept."""
+
+MOMENTS = 3.0
+"""Seconds in which who cancels what was resumed takes that back, and not what was done before."""
 
 LOOKING_THROUGH = "film"
 """The one stage of looking through a film, as the core calls it: what remains of it can be told."""
@@ -93,7 +108,7 @@ def head_of(stage: str) -> str:
 @dataclass(frozen=True)
 class Job:
     """Work under way. done: finished stages with their seconds; started: when `stage` began. pausable: what
-    is done of it is kept; pausing: it is to stop and stay so."""
+    is done of it is kept; pausing: it is to stop and stay so. resumed: it goes on from what was kept."""
 
     title: str
     stage: str = ""
@@ -103,6 +118,11 @@ class Job:
     cancelling: bool = False
     pausable: bool = False
     pausing: bool = False
+    resumed: bool = False
+
+    def age(self, now: float) -> float:
+        """Seconds since it began."""
+        return now - self.started + sum(seconds for _, seconds in self.done)
 
 
 @dataclass(frozen=True)
@@ -113,6 +133,7 @@ class SceneInfo:
     memory: of what was computed about it last; goes on with the same scene.
     own_views: whether it says which photo made which Gaussian, so that photos can be compared.
     extent: corners (low, high) of the box around nearly all of it, world axes, scene units. above: the map.
+    lenses: those that its photos told.
     """
 
     serial: int
@@ -128,6 +149,7 @@ class SceneInfo:
     own_views: bool = False
     extent: tuple[Vector, Vector] | None = None
     above: "Above | None" = field(default=None, compare=False, repr=False)
+    lenses: tuple[FoundLens, ...] = ()
     memory: SceneMemory = field(default=None, compare=False, repr=False)  # type: ignore[assignment]
 
     def __post_init__(self) -> None:
@@ -171,7 +193,7 @@ class Showing:
     being looked for. rooms: scenes that were on show before, the last one first. dropped: photos while it is
     asked where they belong. pending: commands that wait for an answer about unsaved edits. view: of the photo
     stood at, if any. compare: where the photo begins, 0 to 1 across the picture; None: not compared.
-    unfinished: photos on which work was begun and kept.
+    unfinished: photos on which work was begun and kept. taken_out: what the tray had before.
     unhidden: the scene on show as it was before something in it was hidden for good, until that is saved;
     shown_by: files of scenes that show what was hidden in it by then.
     """
@@ -192,6 +214,15 @@ class Showing:
     shown_by: tuple[Path, ...] = ()
     job: Job | None = None
     unfinished: tuple[Path, ...] = ()
+    taken_out: TakenOut | None = None
+
+    @property
+    def num_taken_out(self) -> int:
+        """Photos that were taken out of the tray and can be put back: nothing was done to it since."""
+        taken = self.taken_out
+        if taken is None or self.job is not None or {photo.path for photo in self.photos} != set(taken.left):
+            return 0
+        return len(taken.photos) - len(taken.left)
 
     @property
     def goes_on(self) -> bool:

@@ -35,6 +35,7 @@ from .commands import (
     Thinned,
     WorkFound,
 )
+from .lenses import told_lenses
 from .memory import SceneMemory
 from .standing import Levelled
 from .state import ABOVE, WHOLE_PHOTOS, SceneInfo
@@ -172,6 +173,7 @@ def describe_scene(scene: "Scene", serial: int, name: str, path: Path | None = N
         own_views=scene.num_views > 1 and scene.view_ids is not None,
         extent=_extent(means),
         above=seen_from_above(scene),
+        lenses=told_lenses(scene.record),
     )
 
 

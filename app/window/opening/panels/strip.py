@@ -41,8 +41,8 @@ def draw(state: State, look: Look) -> list[do.Command]:
 
 
 def told(film: Film) -> str:
-    """What became of the film's frames, as proposed."""
-    left = [f"{count} {REASONS[key]}" for key, count in film.left if count]
+    """What became of the film's frames."""
+    left = [f"{count} {REASONS[key]}" for key, count in film.left_out.items() if count]
     return f"Of {film.strip.looked} frames {', '.join(left)}." if left else f"{film.strip.looked} frames."
 
 

@@ -8,6 +8,7 @@ from imgui_bundle import icons_fontawesome_6 as fa
 
 from langflash_core.geometry.poses import FOV_RANGE
 from langflash_core.images.still_names import shown_name
+from langflash_core.records import FoundLens
 from langflash_core.running import left
 
 from ... import commands as do
@@ -16,13 +17,13 @@ from ...kit.look import Look
 from ...opening import commands as opening
 from ...state import State
 from .. import commands as show
+from .. import lenses
 from ..state import Job, Photo, said
 from . import rooms, stages
 
 COLUMNS, MORE = 3, 5  # photos side by side; the second where there are over 12
 _CANCEL = 104.0  # design pixels
 NOTABLE_SECONDS = 0.05  # of a finished stage; a shorter one is only a heading of others
-ASSUMED_FOV = 65.0  # degrees, as the core assumes where neither file nor person says
 HOW_TO_TELL = "click a photo to tell it"
 WITHOUT_PHOTOS = "open the photos to tell it"
 _DRAGGED = "photo"  # what a card is called while it is dragged
@@ -39,16 +40,24 @@ def draw(state: State, look: Look) -> list[do.Command]:
         issued += _tray(state, look)
     else:
         _hint(look)
-    if state.scene.job is not None:
-        issued += _progress(state.scene.job, state.now, look)
-    elif state.scene.photos:
-        issued += _buttons(state, look)
-    else:
-        issued += _open_button()
+    issued += _row(state, look)
     for sentence in _sentences(state):
         _warning(sentence)
     stages.draw(state, look)
     return issued
+
+
+def _row(state: State, look: Look) -> list[do.Command]:
+    """The one line of buttons. Of each kind of it they stand in the places of others: the second of a double
+    click on those is none on these."""
+    scene = state.scene
+    if scene.job is not None:
+        kind, issued = "job", _progress(scene.job, state.now, look)
+    elif scene.photos:
+        kind, issued = f"photos {_icons(state)}", _buttons(state, look)
+    else:
+        kind, issued = "none", _open_button(state, look)
+    return issued if widgets.takes_clicks(f"row {kind}") else []
 
 
 def _sentences(state: State) -> list[str]:
@@ -95,18 +104,22 @@ def _tray(state: State, look: Look) -> list[do.Command]:
     columns = COLUMNS if len(state.scene.photos) <= 12 else MORE
     width = (imgui.get_content_region_avail().x - (columns - 1) * spacing) / columns
     size = ImVec2(width, width * 0.75)
+    info = state.scene.info if state.scene.aside is None else None  # else it is of other photos
+    places = lenses.places(info)
     for index, photo in enumerate(state.scene.photos):
         if index % columns:
             imgui.same_line()
         imgui.push_id(str(photo.path))
-        removed = _card(look, photo, size, state.scene.job is None)
+        picture = look.thumbnails.get(str(photo.path))
+        found = None if picture is None else lenses.found_lens(info, places, photo, picture[1])
+        removed = _card(look, photo, found, size, state.scene.job is None)
         if state.scene.job is None:
             issued += _drag(index)
             if removed:
                 issued.append(show.RemovePhoto(index))
             elif imgui.is_item_deactivated() and imgui.is_item_hovered() and not _slipped():
                 imgui.open_popup("lens")
-        issued += _details(state, index, photo, look)
+        issued += _details(state, index, photo, found, look)
         imgui.pop_id()
     return issued
 
@@ -130,7 +143,7 @@ def _drag(index: int) -> list[do.Command]:
     return issued
 
 
-def _card(look: Look, photo: Photo, size: ImVec2, open_for_change: bool) -> bool:
+def _card(look: Look, photo: Photo, found: FoundLens | None, size: ImVec2, open_for_change: bool) -> bool:
     """One thumbnail, cropped to the card; returns whether its cross was pressed."""
     corner = imgui.get_cursor_screen_pos()
     end = ImVec2(corner.x + size.x, corner.y + size.y)
@@ -150,7 +163,7 @@ def _card(look: Look, photo: Photo, size: ImVec2, open_for_change: bool) -> bool
         middle = ImVec2((corner.x + end.x - extent.x) / 2, (corner.y + end.y - extent.y) / 2)
         canvas.add_text(middle, widgets.u32(theme.BAD if photo.problem else theme.MUTED), icon)
     if picture is not None:
-        _badge(look, ImVec2(corner.x + look.px(4), end.y - look.px(4)), f"{_fov(photo):.0f}°")
+        _badge(look, ImVec2(corner.x + look.px(4), end.y - look.px(4)), f"{_fov(photo, found):.0f}°")
     if photo.notes:
         place = ImVec2(corner.x + look.px(4), corner.y + look.px(22))
         _badge(look, place, fa.ICON_FA_TRIANGLE_EXCLAMATION, theme.DARK.ACCENT)
@@ -184,29 +197,36 @@ def _cross(look: Look, upper_right: ImVec2) -> bool:
     return over and imgui.is_mouse_clicked(0)
 
 
-def _fov(photo: Photo) -> float:
-    """Degrees in force."""
-    return photo.fov or photo.recorded or ASSUMED_FOV
+def _fov(photo: Photo, found: FoundLens | None) -> float:
+    """Degrees in force: the person's own come before what the photos told, and that before their files."""
+    told = photo.recorded or lenses.ASSUMED_FOV if found is None else found.fov
+    return photo.fov or told
 
 
-def _details(state: State, index: int, photo: Photo, look: Look) -> list[do.Command]:
+def _source(photo: Photo, found: FoundLens | None) -> str:
+    """Whence these are."""
+    if photo.fov is not None:
+        return "your own"
+    if found is not None:
+        return f"found from the photos, ± {found.error:.1f}"
+    return "from the file" if photo.recorded else "assumed: the file does not say"
+
+
+def _details(state: State, index: int, photo: Photo, found: FoundLens | None, look: Look) -> list[do.Command]:
     """A card's own panel: its lens, its place, what the triage has to say."""
     issued: list[do.Command] = []
     imgui.set_next_window_size(ImVec2(look.px(330), 0))
     if not imgui.begin_popup("lens"):
         return issued
     widgets.heading(shown_name(photo.path.name))
-    if photo.fov is not None:
-        source = "your own"
-    else:
-        source = "from the file" if photo.recorded else "assumed: the file does not say"
-    widgets.muted(f"Field of view of the longer side, {source}")
-    width = imgui.get_content_region_avail().x
-    changed, fov = widgets.slider("##fov", _fov(photo), FOV_RANGE, f"{_fov(photo):.0f}°", "", width)
+    widgets.muted(f"Field of view of the longer side, {_source(photo, found)}")
+    width, now = imgui.get_content_region_avail().x, _fov(photo, found)
+    changed, fov = widgets.slider("##fov", now, FOV_RANGE, f"{now:.0f}°", "", width)
     if changed:
         issued.append(show.SetPhotoFov(index, fov))
     imgui.begin_disabled(photo.fov is None)
-    if imgui.button(f"{fa.ICON_FA_ROTATE_LEFT}  As recorded" if photo.recorded else "Assume again"):
+    untold = "As recorded" if photo.recorded else "Assume again"
+    if imgui.button(f"{fa.ICON_FA_ROTATE_LEFT}  {untold if found is None else 'As found'}"):
         issued.append(show.SetPhotoFov(index, None))
     imgui.end_disabled()
     issued += _order(state, index)
@@ -237,18 +257,43 @@ def _order(state: State, index: int) -> list[do.Command]:
     return issued
 
 
-def _open_button() -> list[do.Command]:
+def _open_button(state: State, look: Look) -> list[do.Command]:
     """In the place of the others while there is no photo."""
-    pressed = imgui.button(f"{fa.ICON_FA_FOLDER_OPEN}  Open ...", ImVec2(-1, 0))
-    return [opening.OpenFiles()] if pressed else []
+    pressed = imgui.button(f"{fa.ICON_FA_FOLDER_OPEN}  Open ...", ImVec2(_beside(state, look), 0))
+    return [*([opening.OpenFiles()] if pressed else []), *_put_back(state, look)]
+
+
+def _icons(state: State) -> tuple[bool, ...]:
+    """Which buttons of an icon alone there are: for a pair, to put photos back, to clear the tray."""
+    count = len(state.scene.photos)
+    return count >= 3, state.scene.num_taken_out > 0, count > 0
+
+
+def _side(look: Look) -> float:
+    """The width of one of them."""
+    return imgui.get_frame_height() + look.px(6)
+
+
+def _beside(state: State, look: Look) -> float:
+    """The width that they leave to the first button."""
+    each = _side(look) + imgui.get_style().item_spacing.x
+    return imgui.get_content_region_avail().x - sum(_icons(state)) * each
+
+
+def _put_back(state: State, look: Look) -> list[do.Command]:
+    """A button for what was taken out of the tray last."""
+    count = state.scene.num_taken_out
+    if not count:
+        return []
+    imgui.same_line()
+    pressed = imgui.button(f"{fa.ICON_FA_ROTATE_LEFT}##back", ImVec2(_side(look), 0))
+    widgets.tooltip(f"Put {count} photos back" if count > 1 else "Put the photo back")
+    return [show.PutPhotosBack()] if pressed else []
 
 
 def _buttons(state: State, look: Look) -> list[do.Command]:
     issued: list[do.Command] = []
-    few = len(state.scene.photos) < 3
-    side, gap = imgui.get_frame_height() + look.px(6), imgui.get_style().item_spacing.x
-    others = side + gap if few else 2 * (side + gap)
-    width = imgui.get_content_region_avail().x - others
+    side, width = _side(look), _beside(state, look)
     imgui.begin_disabled(state.scene.choosing)
     goes_on = state.scene.goes_on
     label = f"{fa.ICON_FA_PLAY}  Resume" if goes_on else f"{fa.ICON_FA_CUBES}  Reconstruct"
@@ -256,12 +301,13 @@ def _buttons(state: State, look: Look) -> list[do.Command]:
         issued.append(show.Instead((show.Reconstruct(),)))
     if goes_on:
         widgets.tooltip("Go on from what was kept of these photos")
-    if not few:
+    if _icons(state)[0]:
         imgui.same_line()
-        icon = fa.ICON_FA_HOURGLASS_HALF if state.scene.choosing else fa.ICON_FA_WAND_MAGIC_SPARKLES
+        icon = fa.ICON_FA_HOURGLASS_HALF if state.scene.choosing else fa.ICON_FA_FILTER
         if imgui.button(f"{icon}##pair", ImVec2(side, 0)):
             issued.append(show.ChoosePair())
         widgets.tooltip("Keep only the two photos that make the best scene together")
+    issued += _put_back(state, look)
     imgui.same_line()
     if imgui.button(f"{fa.ICON_FA_TRASH}##clear", ImVec2(side, 0)):
         issued.append(show.ClearPhotos())
@@ -280,7 +326,7 @@ def _progress(job: Job, now: float, look: Look) -> list[do.Command]:
     widgets.tooltip("Stop it  (Esc)")
     imgui.same_line()
     if job.pausable:
-        if imgui.button(f"{fa.ICON_FA_PAUSE}##pause", ImVec2(imgui.get_frame_height() + look.px(6), 0)):
+        if imgui.button(f"{fa.ICON_FA_PAUSE}##pause", ImVec2(_side(look), 0)):
             issued.append(show.PauseJob())
         widgets.tooltip("Pause it: what is done stays, also when the program ends")
         imgui.same_line()
@@ -306,9 +352,7 @@ def _doing(job: Job) -> str:
 
 def _seconds(job: Job, now: float) -> str:
     """What is left of the job, where that can be told; else seconds of the stage so far."""
-    gone = now - job.started
-    rest = left(gone + sum(seconds for _, seconds in job.done), job.fraction)
-    return rest or f"{gone:.1f} s"
+    return left(job.age(now), job.fraction) or f"{now - job.started:.1f} s"
 
 
 def _told(job: Job) -> str:

@@ -1,5 +1,6 @@
 """A film in the window: looked through, its strip shown and changed, its frames made a scene."""
 
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,7 @@ from app.window.kit import theme
 from app.window.opening import commands as opening
 from app.window.opening import effects, work
 from app.window.opening.panels import strip as panel
-from app.window.opening.state import Film
+from app.window.opening.state import Film, told_film
 from app.window.scene import commands as show
 from app.window.scene.drops import FILM_PHOTOS, MAX_PHOTOS, sort_drop
 from app.window.scene.effects import SceneEffects
@@ -194,3 +195,36 @@ def test_what_remains_of_a_film_is_told() -> None:
     assert tray._seconds(job, 14.0) == "about 12 s left" and tray._seconds(job, 10.5) == "0.5 s"
     before = Job("x", "network", 0.25, started=10.0, done=(("photos", 8.0),))
     assert tray._seconds(before, 14.0) == "about 36 s left"
+
+
+def test_what_is_told_of_frames_adds_up_however_they_are_chosen(desk: Desk) -> None:
+    """A frame that was taken in by hand was still among those left out."""
+
+    def kept() -> int:
+        return len(desk.film.chosen) + sum(desk.film.left_out.values())
+
+    assert kept() == desk.film.strip.looked == 40
+    proposed = desk.film.left_out
+    left = next(index for index in range(len(desk.film.strip.stills)) if index not in desk.film.chosen)
+    desk.perform(opening.SwitchFrame(left))
+    assert kept() == 40 and sum(told_film(desk.film)["why"].values()) == 40 - len(desk.film.chosen)
+    assert f"{proposed['between'] - 1} lay between them" in panel.told(desk.film)
+    for index in range(len(desk.film.strip.stills)):
+        desk.perform(opening.SwitchFrame(index))
+        assert kept() == 40 and min(desk.film.left_out.values()) >= 0
+    for index in {*desk.film.chosen} ^ {*desk.film.proposed}:
+        desk.perform(opening.SwitchFrame(index))
+    assert desk.film.left_out == proposed
+
+
+def test_a_blurred_frame_that_is_taken_in_was_blurred(desk: Desk) -> None:
+    stills = tuple(
+        replace(still, blurred=1, smear=2.0) if index == 3 else still
+        for index, still in enumerate(desk.film.strip.stills)
+    )
+    strip = replace(desk.film.strip, stills=stills)
+    film = opening.proposed(desk.film.path, strip, FILM_PHOTOS)
+    assert 3 not in film.chosen
+    by_hand = replace(film, chosen=tuple(sorted({*film.chosen, 3})))
+    assert by_hand.left_out["blurred"] == film.left_out["blurred"] - 1
+    assert sum(by_hand.left_out.values()) + len(by_hand.chosen) == strip.looked

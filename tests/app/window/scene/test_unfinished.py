@@ -10,7 +10,7 @@ import pytest
 
 from app.window.scene import commands as show
 from app.window.scene import unfinished, work
-from app.window.scene.state import PAUSED
+from app.window.scene.state import MOMENTS, PAUSED
 from app.window.state import State
 from langflash_core import pipeline
 from langflash_core.errors import Cancelled
@@ -161,7 +161,8 @@ def test_few_photos_are_not_paused_and_what_is_cancelled_is_not_resumed(photos):
     assert show.PauseJob().apply(few) is few
     assert show.PauseJob().apply(State()) == State()
     paused = show.JobCancelled().apply(show.PauseJob().apply(running(photos)))
-    again = show.CancelJob().apply(show.Reconstruct().apply(paused))
+    resumed = show.Reconstruct().apply(paused)
+    again = show.CancelJob().apply(replace(resumed, now=resumed.now + MOMENTS))
     assert not show.JobCancelled().apply(again).scene.goes_on
 
 
