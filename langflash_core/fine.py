@@ -5,7 +5,7 @@ in shape.
 
 import math
 import time
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import overload
 
@@ -15,6 +15,7 @@ from jaxtyping import Bool
 from torch import Tensor
 from torch.nn import functional as F
 
+from langflash_core.at_once import at_once
 from langflash_core.detail import Detail
 from langflash_core.geometry.harmonics import colour_to_sh, sh_to_colour, slopes_to_sh
 from langflash_core.images.motion import edge_rise
@@ -64,13 +65,15 @@ def covered_scene(
     *,
     gaussians: int | None,
     preset: str,
+    layered: bool = False,
     progress: Progress = lambda stage, fraction: None,
 ) -> Covered:
     """The scene of a prediction whose depth maps are surfaces, before colours are solved for: all that needs
     the prediction, whose maps of many photos are much memory.
 
     Args:
-        gaussians: about so many; None: as `detail` has it. preset: recorded.
+        gaussians: about so many; None: as `detail` has it. preset: recorded. layered: every photo keeps a
+            whole layer of its own (`splat.compose`).
         progress: called before each step; what it raises ends the work there.
 
     Raises:
@@ -86,7 +89,11 @@ def covered_scene(
     grid = (views.images.shape[-2], views.images.shape[-1])
     photos, whole = _Photos(views, light, grid), _Photos(views, light.whole, grid)
     views = replace(views, images=light.corrected(views.images).clamp(0, 1))
-    left = strangers(views.images, prediction.depths, prediction.viewmats, views.Ks)
+    layered = layered and views.num_views > 1
+    if layered:
+        left = torch.zeros_like(prediction.depths, dtype=torch.bool)
+    else:
+        left = strangers(views.images, prediction.depths, prediction.viewmats, views.Ks)
     scene = assemble_detailed(
         prediction,
         views,
@@ -94,7 +101,8 @@ def covered_scene(
         detail,
         gaussians=gaussians,
         strangers=left if bool(left.any()) else None,
-        fineness=photos.fineness,
+        fineness=None if layered else photos.fineness,
+        layered=layered,
         preset=preset,
         progress=lambda done: progress("elements", 0.1 + 0.3 * done),
     )
@@ -107,7 +115,8 @@ def coloured_scene(covered: Covered, progress: Progress = lambda stage, fraction
     """The scene in the colours of all its photos, without what nobody sees; `progress` as `covered_scene`."""
     solving, left = time.perf_counter(), covered.left
     silent, light = _Silent(covered.photos, left), covered.light
-    scene = _coloured(covered.scene, silent, light, lambda done: progress("colours", 0.4 + 0.5 * done))
+    coloured = _coloured_layers if covered.scene.layered else _coloured
+    scene = coloured(covered.scene, silent, light, lambda done: progress("colours", 0.4 + 0.5 * done))
     timings = {**scene.record.cost.timings, "colours": time.perf_counter() - solving}
     shares = _shares(left)
     said = (*scene.record.warnings, *_told(shares, scene.record.photos))
@@ -241,3 +250,33 @@ def _coloured(scene: Scene, photos: _Silent, light: Light, progress: Callable[[f
         return scene
     counts = {**scene.record.counts, "hindering": int(solved.hinders.sum())}
     return scene.rows(~solved.hinders).with_record(counts=counts)
+
+
+def _coloured_layers(scene: Scene, photos: _Silent, light: Light, progress: Callable[[float], None]) -> Scene:
+    """As `_coloured`, each layer in the colours of its own photo alone."""
+    assert scene.view_ids is not None
+    low, high = (ends.float() for ends in light.span)
+    start = sh_to_colour(scene.gaussians.sh, scene.gaussians.means)
+    own = light.whole.gains.square().mean(1).sqrt().tolist()
+    starts = torch.searchsorted(scene.view_ids, torch.arange(len(photos) + 1)).tolist()  # in order of views
+
+    def solved(view: int) -> tuple[Tensor, float]:
+        rows = slice(starts[view], starts[view + 1])
+        found = solved_colours(
+            scene.gaussians.map(lambda values: values[rows]),
+            (start[rows] - low) / (high - low),
+            [scene.camera(view, *photos.size(view))],
+            [photos[view]],
+            ringing=_RINGING,
+        )
+        return found.colours, found.psnr[0][1] + 20 * math.log10(own[view])
+
+    def turns() -> Iterator[int]:
+        for view in range(len(photos)):
+            progress(view / len(photos))
+            yield view
+
+    colours, near = zip(*at_once(solved, turns()), strict=True)
+    sh = colour_to_sh(low + (high - low) * torch.cat(colours))[:, None]
+    bought = {**scene.record.detail, "rounds": ROUNDS, "photos_psnr_db": [round(db, 2) for db in near]}
+    return replace(scene, gaussians=replace(scene.gaussians, sh=sh)).with_record(detail=bought)

@@ -169,7 +169,8 @@ class Record:
     preset: of the network. source: the splat file it came from. photos: names, one per view.
     warnings: a sentence each. metric_scale: metres per scene unit. network_unit: the network's
     length units per scene unit. counts: Gaussians predicted and left out. pruning: as `prune` left
-    it. refinement: what a fit to the photos brought. detail: what was spent on how fine elements, and what
+    it. layered: every photo has a whole layer of its own (`splat.compose`). refinement: what a fit to the
+    photos brought. detail: what was spent on how fine elements, and what
     it bought. light: `gains` and `offsets`, a row of
     red, green and blue for each view, by which `scene.light` brought the photos' colours to one light. lens:
     `found`, a mapping of `FoundLens` for each lens that the photos told. left_out:
@@ -186,6 +187,7 @@ class Record:
     """
 
     preset: str | None = None
+    layered: bool = False
     source: str | None = None
     photos: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()

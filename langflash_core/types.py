@@ -299,6 +299,23 @@ class Scene:
     def num_views(self) -> int:
         return self.viewmats.shape[0]
 
+    @property
+    def layered(self) -> bool:
+        """Whether every photo has a whole layer of its own, and a view is blended of the nearest ones
+        (`splat.compose`)."""
+        return self.record.layered and self.view_ids is not None
+
+    def layer(self, view: int) -> "Scene":
+        """What one photo made of a layered scene, and what no photo did, as a scene of one layer.
+
+        Raises:
+            ValueError: nobody knows which photo made which Gaussian.
+        """
+        if self.view_ids is None:
+            raise ValueError("view_ids: expected the photo that made each Gaussian, received none")
+        own = (self.view_ids == view) | (self.view_ids < 0)
+        return self.rows(own).with_record(layered=False)
+
     def some_views(self, most: int) -> list[int]:
         """At most so many of the input views, evenly spaced, the first among them."""
         asked = min(self.num_views, most)

@@ -105,3 +105,16 @@ def rotation_angle_degrees(
     sine = torch.stack((skew[..., 2, 1], skew[..., 0, 2], skew[..., 1, 0]), -1).norm(dim=-1) / 2
     cosine = (relative.diagonal(dim1=-2, dim2=-1).sum(-1) - 1) / 2
     return torch.rad2deg(torch.atan2(sine, cosine))
+
+
+_SAMPLES = 1000  # points that tell the median distance
+
+
+def median_distance(points: Float[Tensor, "N 3"], viewmat: Float[Tensor, "4 4"]) -> float:
+    """Median, of some points in the world from a camera's place; 1 where there is none."""
+    some = points[:: max(1, len(points) // _SAMPLES)].detach().cpu().double()
+    centre = invert_rigid(viewmat.detach().cpu().double())[:3, 3]
+    distances = (some - centre).norm(dim=-1)
+    distances = distances[torch.isfinite(distances)]
+    middle = float(distances.median()) if len(distances) else 0.0
+    return middle if middle > 0 else 1.0

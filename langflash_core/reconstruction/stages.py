@@ -138,6 +138,7 @@ def _assembled(
             tools.finer,
             gaussians=wishes.gaussians,
             preset=wishes.preset,
+            layered=wishes.layers,
             progress=told,
         )
         del prediction  # five megabytes a photo that nobody asks for any more

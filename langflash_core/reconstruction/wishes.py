@@ -30,6 +30,7 @@ class Wishes:
     grouping: str | None = None
     detail: str | None = DEFAULT_DETAIL
     gaussians: int | None = None
+    layers: bool = False
     refine_seconds: float | None = None
     viewmats: Float[Tensor, "V 4 4"] | None = None
     keep: Path | None = None

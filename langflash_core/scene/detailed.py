@@ -51,6 +51,8 @@ _HELD = 8
 GROUND = 4  # pixels, side of the squares under what was parted
 MOST_ENLARGED = 3
 """Times the grid, the size up to which a photo is looked at."""
+MOST_OF_LAYERS = 2_500_000
+"""Gaussians of all layers together: 160 MB in a file."""
 _FINENESS = 1.25
 """Many photos cover what they see more finely than one. Of 17 photos round a room 1.0 gave 412,000 Gaussians
 and 27.2 dB between the photos, 1.5 and no bound 535,000 and 27.4."""
@@ -80,6 +82,7 @@ def assemble_detailed(
     gaussians: int | None = None,
     strangers: Bool[Tensor, "V H W"] | None = None,
     fineness: Float[Tensor, " V"] | None = None,
+    layered: bool = False,
     top_m: int = 8,
     preset: str = "mini",
     progress: Callable[[float], None] = lambda done: None,
@@ -93,6 +96,7 @@ def assemble_detailed(
         strangers: (V, H, W) bool, of the placed views: what gets no Gaussians, and says nothing of those of
             others; None: nothing.
         fineness: (V,) pixels of each placed photo in a row of a cell of the grid; None: as many in all.
+        layered: every photo covers all that it shows, whatever the others see (`splat.compose`).
         progress: called with the share that is done, twice a photo; what it raises ends the work.
 
     Returns:
@@ -109,9 +113,9 @@ def assemble_detailed(
     prediction, views = placed_views(prediction, views)
     if not bool(torch.isfinite(prediction.viewmats).all()):
         raise ValueError("viewmats: expected finite poses, received others")
-    known, keep, unit, through = _kept(prediction, views, strangers, fineness)
+    known, keep, unit, through = _kept(prediction, views, strangers, fineness, layered)
     sights = _Sights(lambda v: _Sight.of(photos[v], views.images[v], known[v].log(), keep[v]), len(photos))
-    budget = gaussians or round(detail.most * _area(keep))
+    budget = gaussians or min(round(detail.most * _area(keep, layered)), MOST_OF_LAYERS)
     trees, limit = _trees(sights, detail, budget, 0.0 if gaussians else detail.gain, progress)
     made, weights, parts = _made(prediction, views, _told(sights, progress, 0.5), trees, limit, top_m)
     size = sights[0].size
@@ -127,6 +131,7 @@ def assemble_detailed(
         confidences=_confidences(prediction, parts),
         record=Record(
             preset=preset,
+            layered=layered,
             photos=views.names,
             warnings=(*views.warnings, *prediction.warnings),
             counts={"predicted": keep.numel(), "covered": int(keep.sum()), "seen_through": through},
@@ -196,15 +201,17 @@ class _Sights(Sequence[_Sight]):
         return self._known[index]
 
 
-def _area(keep: Tensor) -> float:
-    """Cells (V, H, W) that a budget counts: a photo and a quarter of each further one, but of many not more
-    than `_FINENESS` times what they cover: photos that show the same again need no more Gaussians."""
+def _area(keep: Tensor, layered: bool) -> float:
+    """Cells (V, H, W) that a budget counts: of layers all; else a photo and a quarter of each further one, but
+    of many not more than `_FINENESS` times what they cover: photos that show the same again need no more."""
+    if layered:
+        return float(keep.sum())
     usual = keep[0].numel() * (len(keep) + 3) / 4
     return usual if len(keep) <= 2 else min(usual, _FINENESS * float(keep.sum()))
 
 
 def _kept(
-    prediction: Prediction, views: Views, strangers: Tensor | None, fineness: Tensor | None
+    prediction: Prediction, views: Views, strangers: Tensor | None, fineness: Tensor | None, layered: bool
 ) -> tuple[Tensor, Tensor, float, int]:
     """Depths (V, H, W) with what is no number put right; cells (V, H, W) bool that each photo covers itself;
     the scene's unit; how many cells others see through."""
@@ -218,6 +225,8 @@ def _kept(
     nowhere = torch.where(usable.flatten(1)[..., None], points, torch.nan)
     unit = mean_distance(nowhere[0], prediction.viewmats[0])
     trusts = prediction.confidences
+    if layered:
+        return depths, usable, unit, 0
     if strangers is not None:
         usable, trusts = usable & ~strangers, trusts * ~strangers
     through = seen_through(points.flatten(0, 1), prediction.viewmats, Ks, depths, trusts).view_as(usable)

@@ -21,6 +21,7 @@ import numpy as np
 import torch
 from jaxtyping import Float
 
+from langflash_core.geometry import cameras
 from langflash_core.geometry.cameras import invert_rigid
 from langflash_core.types import Camera, Scene
 
@@ -28,7 +29,6 @@ FAR = 0.25
 """Radians: so far from the only photo, a picture is half in its light. Beside eight real photos .2 and .3 are
 best in the mean (MEASURED, "The light of a place")."""
 HERE = 1e-4  # radians, within which a place is a photo's own
-_SAMPLES = 1000  # Gaussians that tell the median distance
 
 
 @dataclass(frozen=True)
@@ -76,10 +76,4 @@ def lit_camera(scene: Scene, camera: Camera) -> Camera:
 
 def median_distance(scene: Scene) -> float:
     """Of some Gaussians from the first photo's place; 1 where there is none."""
-    means = scene.gaussians.means
-    some = means[:: max(1, len(means) // _SAMPLES)].detach().cpu().double()
-    centre = invert_rigid(scene.viewmats[0].detach().cpu().double())[:3, 3]
-    distances = (some - centre).norm(dim=-1)
-    distances = distances[torch.isfinite(distances)]
-    middle = float(distances.median()) if len(distances) else 0.0
-    return middle if middle > 0 else 1.0
+    return cameras.median_distance(scene.gaussians.means, scene.viewmats[0])

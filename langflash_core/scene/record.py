@@ -33,6 +33,7 @@ def to_json(record: Record) -> dict:
     known["camera_path"] = record.camera_path
     known["tour"] = record.tour
     known["edits"] = {"deleted": record.num_deleted} if record.num_deleted else None
+    known["layered"] = record.layered or None
     written = {
         name: list(value) if isinstance(value, tuple) else value
         for name, value in known.items()
@@ -55,7 +56,7 @@ def from_json(values: dict) -> Record:
     world, things = _of_type(values, "world", dict), _of_type(values, "thing_names", dict) or {}
     ours = {
         *known, "atom_names", "atom_denials", "silent_atoms", "lone_atoms", "edits", "camera_path", "tour",
-        "world", "thing_names", _VERSION_1, *_COST,
+        "world", "thing_names", "layered", _VERSION_1, *_COST,
     }  # fmt: skip
     return Record(
         **{name: value for name, value in known.items() if value is not None},
@@ -68,6 +69,7 @@ def from_json(values: dict) -> Record:
         camera_path=tuple(_list(values, "camera_path", dict)),
         tour=told_tour(read_tour(_of_type(values, "tour", dict) or {})),
         num_deleted=int(_of_type(edits, "deleted", int) or 0),
+        layered=_flag(values, "layered"),
         cost=Cost(
             timings=_of_type(values, "timings", dict) or {},
             seconds=_of_type(values, "seconds", dict) or {},
@@ -89,6 +91,13 @@ def _of_type(values: dict, name: str, *types: type):
         return value
     expected = " or ".join(kind.__name__ for kind in types)
     raise ValueError(f"{name}: expected {expected}, received {value!r}")
+
+
+def _flag(values: dict, name: str) -> bool:
+    value = values.get(name, False)
+    if not isinstance(value, bool):
+        raise ValueError(f"{name}: expected true or false, received {value!r}")
+    return value
 
 
 def _list(values: dict, name: str, kind: type) -> list:
