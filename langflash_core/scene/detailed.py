@@ -202,8 +202,8 @@ class _Sights(Sequence[_Sight]):
 
 
 def _area(keep: Tensor, layered: bool) -> float:
-    """Cells (V, H, W) that a budget counts: of layers all; else a photo and a quarter of each further one, but
-    of many not more than `_FINENESS` times what they cover: photos that show the same again need no more."""
+    """Cells (V, H, W) that a budget counts: of layers all; else a photo and a quarter of each further one,
+    but of many at most `_FINENESS` times what they cover: photos that show the same again need no more."""
     if layered:
         return float(keep.sum())
     usual = keep[0].numel() * (len(keep) + 3) / 4
@@ -224,16 +224,43 @@ def _kept(
     points = pos_c @ poses[:, :3, :3].transpose(1, 2) + poses[:, None, :3, 3]
     nowhere = torch.where(usable.flatten(1)[..., None], points, torch.nan)
     unit = mean_distance(nowhere[0], prediction.viewmats[0])
-    trusts = prediction.confidences
     if layered:
         return depths, usable, unit, 0
+    trusts = prediction.confidences
     if strangers is not None:
         usable, trusts = usable & ~strangers, trusts * ~strangers
-    through = seen_through(points.flatten(0, 1), prediction.viewmats, Ks, depths, trusts).view_as(usable)
-    between = outvoted(points, prediction.viewmats, Ks, depths)
-    keep = owned(depths, prediction.viewmats, Ks, usable & ~through & ~between, fineness)
-    keep = filled(depths, prediction.viewmats, Ks, keep, usable, between)
-    return depths, keep, unit, int((through | between).sum())
+    keep, through = _covering(depths, prediction.viewmats, Ks, usable, trusts, points, fineness)
+    return depths, keep, unit, through
+
+
+def covering(
+    depths: Float[Tensor, "V H W"],
+    viewmats: Float[Tensor, "V 4 4"],
+    Ks: Float[Tensor, "V 3 3"],
+    usable: Bool[Tensor, "V H W"],
+    trusts: Float[Tensor, "V H W"],
+) -> Bool[Tensor, "V H W"]:
+    """(V, H, W) bool: the cells that each photo covers itself where all make one surface.
+
+    Args:
+        depths: (V, H, W) > 0. usable: where they show something. trusts: how sure they are, in [0, 1].
+    """
+    poses = invert_rigid(viewmats)
+    pos_c = unproject(depths, Ks).flatten(1, 2)
+    points = pos_c @ poses[:, :3, :3].transpose(1, 2) + poses[:, None, :3, 3]
+    return _covering(depths, viewmats, Ks, usable, trusts, points, None)[0]
+
+
+def _covering(
+    depths: Tensor, viewmats: Tensor, Ks: Tensor, usable: Tensor, trusts: Tensor, points: Tensor,
+    fineness: Tensor | None,
+) -> tuple[Tensor, int]:  # fmt: skip
+    """Cells (V, H, W) bool that each photo covers itself, of points (V, H W, 3) in the world; how many others
+    see through."""
+    through = seen_through(points.flatten(0, 1), viewmats, Ks, depths, trusts).view_as(usable)
+    between = outvoted(points, viewmats, Ks, depths)
+    keep = owned(depths, viewmats, Ks, usable & ~through & ~between, fineness)
+    return filled(depths, viewmats, Ks, keep, usable, between), int((through | between).sum())
 
 
 def _trees(

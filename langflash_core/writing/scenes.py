@@ -9,6 +9,7 @@ from langflash_core.export.language import side_car
 from langflash_core.export.sog import sog_files
 from langflash_core.files import make_folder
 from langflash_core.formats import SOG_FOLDER, kind_of
+from langflash_core.fused import fused
 from langflash_core.level import upright
 from langflash_core.outputs import PLY, loaded
 from langflash_core.scene.thin import coarse_level
@@ -23,7 +24,7 @@ def write_scene(job: Job) -> str:
         LangFlashError: nothing answers, or a file cannot be written.
     """
     scene, path = job.scene, job.request.output
-    chosen = _as_fine(job)
+    chosen = _as_fine(job) if job.kind.subject == "photos" else fused(_as_fine(job))
     if job.prompts:
         chosen = pipeline.select(chosen, job.prompts, threshold=job.request.threshold)
     chosen = upright(chosen) if job.request.upright else chosen
@@ -44,7 +45,7 @@ def write_page(job: Job) -> str:
     Raises:
         LangFlashError: a phrase cannot be used, or the file cannot be written.
     """
-    request, shown = job.request, _as_fine(job)
+    request, shown = job.request, fused(_as_fine(job))
     beside = _beside(job)
     job.progress("reading the vocabulary", 0.2)
     make_folder(request.output.parent)
@@ -77,7 +78,7 @@ def _beside(job: Job) -> dict[str, Scene]:
             raise InputError(
                 f"two scenes are called {path.stem}; rename one, so that the page tells them apart"
             )
-        scenes[path.stem] = _as_fine(job, read(path))
+        scenes[path.stem] = fused(_as_fine(job, read(path)))
     return scenes
 
 

@@ -23,6 +23,7 @@ from .evals.labels import labels
 from .evals.level import level
 from .evals.moved import moved
 from .evals.protocol import protocol
+from .evals.real import real
 from .evals.report import report
 from .evals.sharp import sharp
 from .evals.sides import beside, sides
@@ -53,6 +54,7 @@ def run(args: Namespace, out: TextIO) -> None:
         "level": level,
         "moved": moved,
         "protocol": protocol,
+        "real": real,
         "report": report,
         "sharp": sharp,
         "sides": sides,

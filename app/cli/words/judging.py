@@ -111,6 +111,7 @@ def add_eval(commands) -> None:
     _add_sides(actions)
     _add_sharp(actions)
     _add_walk(actions)
+    _add_real(actions)
     _add_level(actions)
     _add_moved(actions)
     _add_labels(actions)
@@ -338,6 +339,23 @@ def _add_walk(actions) -> None:
     beside.add_argument("-o", "--output", type=Path, metavar="FILE", help="also write the table as .md")
     beside.add_argument("--sheet", type=Path, metavar="IMG", help="also kept frames of both, as .png")
     beside.set_defaults(json=False)
+
+
+def _add_real(actions) -> None:
+    command = new_command(
+        actions,
+        "real",
+        "real frames of a place, without poses: how much of them and of others a scene shows",
+    )
+    command.add_argument("frames", type=Path, metavar="FRAMES", help="a folder of frames in order, or a film")
+    command.add_argument(
+        "--photos", type=whole_count, nargs="+", metavar="N", help="of a scene (default: 4 8 16, if so many)"
+    )
+    command.add_argument("--layers", action="store_true", help="each photo keeps a whole layer of its own")
+    command.add_argument("--no-own", action="store_true", help="leave out what fewer photos bring alone")
+    command.add_argument("--lpips", type=Path, metavar="FILE", help="LPIPS weights of VGG-16, .safetensors")
+    command.add_argument("--sheet", type=Path, metavar="IMG", help="also frames and scenes, as .png")
+    _add_judging(command)
 
 
 def _add_walked(command: argparse.ArgumentParser) -> None:

@@ -133,7 +133,7 @@ def made_of(walk: Walk, frames: Sequence[int], bench: Bench, *, memory: bool = F
     views = tuple(view for view, photo in enumerate(photos) if photo.id in placed)
     fit = fitted_cameras(np.stack([as_array(placed[photos[v].id]) for v in views]), truth[list(views)])
     length = walked(np.stack([walk.camera(frame) for frame in range(frames[0], frames[-1] + 1)]))
-    made = Made(_wordless(scene), tuple(frames), photos, views, fit, length, cost)
+    made = Made(wordless(scene), tuple(frames), photos, views, fit, length, cost)
     return replace(made, fit=_scaled(made, bench.render)) if len(views) < 2 else made
 
 
@@ -194,12 +194,13 @@ def true_cameras(photos: Sequence[LabelledPhoto]) -> Float[np.ndarray, "V 4 4"]:
     return np.stack(found)
 
 
-def _wordless(scene: Scene) -> Scene:
+def wordless(scene: Scene) -> Scene:
     """The scene without language, which costs memory and time to draw; of its record what it is drawn by."""
     count = len(scene.gaussians)
     ids = torch.zeros(count, 0, dtype=torch.int64)
     nothing = Semantics(ids, torch.zeros(count, 0), torch.zeros(0, 0), NO_LANGUAGE)
-    return replace(scene, semantics=nothing, record=Record(light=scene.record.light))
+    told = Record(light=scene.record.light, layered=scene.record.layered)
+    return replace(scene, semantics=nothing, record=told)
 
 
 def _scaled(made: Made, render: Render) -> Similarity:

@@ -1,0 +1,37 @@
+"""One surface of a scene of layers."""
+
+from dataclasses import replace
+
+import torch
+
+from langflash_core.fused import fused, fused_rows
+from langflash_core.splat import render
+from tests.splat.test_compose import layered
+
+
+def test_of_two_layers_that_show_one_wall_one_keeps_it():
+    scene = layered([(2, 0.2, 0), (2, 0.8, 1)], [0, 0.2])
+    whole = fused(scene)
+    assert not whole.layered and len(whole.gaussians) < 0.75 * len(scene.gaussians)
+    frames = [scene.layer(0), whole]
+    camera = scene.camera(0)
+    alphas = [render(each, camera).alphas for each in frames]
+    assert float(alphas[1].min()) > 0.9 * float(alphas[0].min())  # as closed as one layer
+
+
+def test_what_no_photo_made_stays():
+    scene = layered([(2, 0.2, 0), (2, 0.8, 1)], [0, 0.2])
+    ids = scene.view_ids.clone()
+    ids[:7] = -1
+    assert bool(fused_rows(replace(scene, view_ids=ids))[:7].all())
+
+
+def test_a_scene_without_layers_is_as_it_was():
+    scene = layered([(2, 0.2, 0)], [0]).with_record(layered=False)
+    assert fused(scene) is scene
+
+
+def test_where_layers_show_nothing_nothing_fails():
+    scene = layered([(2, 0.2, 0), (2, 0.8, 1)], [0, 0.2])
+    empty = scene.rows(torch.zeros(len(scene.gaussians), dtype=torch.bool))
+    assert len(fused(empty).gaussians) == 0
