@@ -1,5 +1,6 @@
 """Views of scenes of layers: which layers, with which weights, and what their blend keeps."""
 
+import itertools
 import math
 from dataclasses import replace
 
@@ -139,7 +140,7 @@ def test_a_step_of_the_camera_is_a_step_of_the_picture_everywhere():
     walls = [(2 + 0.05 * k, 0.1 + 0.15 * k, 0) for k in range(6)]
     scene = layered(walls, [0.0, 0.9, 2.1, 3.0, 3.8, 5.0])
     rgb = [compose.render(scene, camera_at(scene, at)).rgb for at in np.arange(0.5, 4.5, 0.05)]
-    steps = [float((a - b).abs().max()) for a, b in zip(rgb, rgb[1:], strict=False)]
+    steps = [float((a - b).abs().max()) for a, b in itertools.pairwise(rgb)]
     # weights of 1 / f^2 change by 2 / FLOOR of themselves a distance at a photo's place, where they are 1;
     # a step is .05 / 2 of a distance at most, and colours differ by .75
     assert max(steps) < 0.75 * 2 / compose.FLOOR * 0.05 / 2
