@@ -22,7 +22,7 @@ from langflash_core.errors import SceneFileError
 from langflash_core.geometry.quaternions import quats_to_matrices
 from langflash_core.limits import HEADER
 
-USHORT, UINT, FLOAT, ARRAY, INDICES = 5123, 5125, 5126, 34962, 34963
+USHORT, UINT, FLOAT, ARRAY = 5123, 5125, 5126, 34962
 TYPES = {5120: "i1", 5121: "u1", 5122: "<i2", USHORT: "<u2", UINT: "<u4", FLOAT: "<f4"}
 WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
 REMEDY = "export it again, or name a .ply"
