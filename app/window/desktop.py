@@ -2,6 +2,8 @@
 
 import ctypes
 import logging
+import os
+from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import replace
 from typing import Any
@@ -142,12 +144,26 @@ def short_name(renderer: str) -> str:
     return renderer.split(" (")[0].split("/")[0].strip()
 
 
-def clipboard(window) -> str:
-    """Its text; empty without one."""
+def clipboard(window, errors: str = "replace") -> str:
+    """Its text; empty without one. errors: as of `bytes.decode`, for what is no UTF-8."""
     text = glfw.get_clipboard_string(window)
-    return text_of(text) if text else ""
+    return text_of(text, errors) if text else ""
 
 
-def text_of(text: bytes | str) -> str:
+def text_of(text: bytes | str, errors: str = "replace") -> str:
     """What glfw says, which is bytes here and there."""
-    return text.decode(errors="replace") if isinstance(text, bytes) else text
+    return text.decode(errors=errors) if isinstance(text, bytes) else text
+
+
+def on_drop(window, dropped: Callable[[tuple[str, ...]], None]) -> object:
+    """Call `dropped` with the paths of a drop; what comes back must live as long as the window.
+
+    As glfw's own, which lets go of a whole drop where a name is not UTF-8.
+    """
+
+    def decoded(_window, count: int, paths) -> None:
+        dropped(tuple(os.fsdecode(paths[place]) for place in range(count)))
+
+    kept = glfw._GLFWdropfun(decoded)
+    glfw._glfw.glfwSetDropCallback(window, kept)
+    return kept

@@ -107,7 +107,8 @@ class Session:
         keeper = Keeper()
         recovery = RecoveryEffects(hands, keeper)
         remembering = RememberingEffects(hands, self._viewport, self._thumbnails)
-        opening = OpeningEffects(hands, self._thumbnails, lambda: desktop.clipboard(self._window))
+        copied = lambda: desktop.clipboard(self._window, "surrogateescape")  # noqa: E731
+        opening = OpeningEffects(hands, self._thumbnails, copied)
         self._effects = (
             SceneEffects(hands, self._viewport, self._thumbnails, self._entitle),
             opening,
