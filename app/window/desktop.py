@@ -31,14 +31,14 @@ def place(window, preferences: Preferences) -> None:
         x, y = glfw.get_window_pos(window)
     scale = interface_scale(window)
     left, top, width, height = preferences.window or (x, y, *made)
-    least = [round(scale * side) for side in MIN_SIZE]
-    placed = fitted((left, top, max(width, least[0]), max(height, least[1])), areas, frame)
-    least = [min(side, most) for side, most in zip(least, placed[2:], strict=True)]
-    glfw.set_window_size_limits(window, *least, glfw.DONT_CARE, glfw.DONT_CARE)
-    if placed[2:] != made:
-        glfw.set_window_size(window, *placed[2:])
-    if placed[:2] != (x, y):
-        glfw.set_window_pos(window, *placed[:2])
+    wide, high = (round(scale * side) for side in MIN_SIZE)
+    left, top, width, height = fitted((left, top, max(width, wide), max(height, high)), areas, frame)
+    least = min(wide, width), min(high, height)
+    glfw.set_window_size_limits(window, least[0], least[1], glfw.DONT_CARE, glfw.DONT_CARE)
+    if (width, height) != made:
+        glfw.set_window_size(window, width, height)
+    if (left, top) != (x, y):
+        glfw.set_window_pos(window, left, top)
     if preferences.maximised:
         glfw.maximize_window(window)
 
@@ -202,6 +202,7 @@ def on_drop(window, dropped: Callable[[tuple[str, ...]], None]) -> object:
     def decoded(_window, count: int, paths) -> None:
         dropped(tuple(os.fsdecode(paths[place]) for place in range(count)))
 
-    kept = glfw._GLFWdropfun(decoded)
-    glfw._glfw.glfwSetDropCallback(window, kept)
+    binding: Any = glfw
+    kept = binding._GLFWdropfun(decoded)
+    binding._glfw.glfwSetDropCallback(window, kept)
     return kept

@@ -8,7 +8,6 @@ import os
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from enum import Enum
-from operator import attrgetter
 from pathlib import Path
 
 from langflash_core.formats import SOG_FOLDER, is_film, is_photo, kind_of
@@ -123,11 +122,12 @@ def sort_drop(paths: Iterable[str | Path]) -> Drop:
     """Sort paths by what they are; a folder stands for the photos directly in it, else for its films,
     else for its scenes. A file with a name that says nothing is a photo where it begins as one."""
     found = [_sorted(path) for path in map(Path, paths)]
-    kinds = ((path for drop in found for path in of(drop)) for of in (_PHOTOS, _FILMS, _SCENES))
-    return Drop(*map(_each_once, kinds), tuple(sentence for drop in found for sentence in drop.rejected))
-
-
-_PHOTOS, _FILMS, _SCENES = map(attrgetter, ("photos", "films", "scenes"))
+    return Drop(
+        photos=_each_once(path for drop in found for path in drop.photos),
+        films=_each_once(path for drop in found for path in drop.films),
+        scenes=_each_once(path for drop in found for path in drop.scenes),
+        rejected=tuple(sentence for drop in found for sentence in drop.rejected),
+    )
 
 
 def _sorted(path: Path) -> Drop:
