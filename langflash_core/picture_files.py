@@ -8,6 +8,7 @@ whatever happens to it is an `OSError` here. Of pictures that move, the first is
 import ctypes
 import io
 import logging
+import struct
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -25,6 +26,10 @@ FORMATS = ("JPEG", "MPO", "PNG", "WEBP", "TIFF", "HEIF", "AVIF", "JPEG2000", "BM
 STORED = ("JPEG", "PNG", "WEBP")
 """Of pictures inside scenes and other files of ours."""
 _APART = frozenset(("HEIF", "AVIF"))
+_BRANDS = frozenset(  # of files that begin as films do, too
+    (b"heic", b"heix", b"heim", b"heis", b"hevc", b"hevx", b"mif1", b"msf1", b"avif", b"avis")
+)
+_DAMAGE = (OSError, SyntaxError, ValueError, TypeError, LookupError, ArithmeticError, struct.error)
 
 
 class TooManyPixels(OSError):
@@ -59,6 +64,19 @@ def opened_picture(
     finally:
         if stream is not source:
             stream.close()
+
+
+def is_picture(path: Path) -> bool:
+    """Whether a file begins as one of `FORMATS` does, whatever it is called; no pixel is decoded."""
+    try:
+        with path.open("rb") as stream:
+            start = stream.read(12)
+        if start[4:8] == b"ftyp":
+            return start[8:] in _BRANDS
+        with opened_picture(path):
+            return True
+    except _DAMAGE:
+        return False
 
 
 def picture_block(picture: Image.Image, name: str) -> bytes | None:
