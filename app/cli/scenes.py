@@ -1,5 +1,6 @@
 """Scenes that a command is given: LangFlash's own files, and splat files of other programs."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 from langflash_core.errors import SceneFileError
@@ -22,3 +23,10 @@ def open_scene(path: Path) -> Scene:
     if scene.semantics.space == NO_LANGUAGE:
         say_warnings(scene.record.warnings)
     return scene
+
+
+def say_hints(scene: Scene, phrases: Sequence[str]) -> None:
+    """What people should know of phrases that a scene is asked, on stderr."""
+    from langflash_core.language.hints import hints
+
+    say_warnings(hint for hint in dict.fromkeys(hints(scene, phrases)) if hint)

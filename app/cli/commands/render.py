@@ -17,7 +17,7 @@ from langflash_core.writing.drawn import Look
 from ..cameras import chosen_camera
 from ..renderers import open_renderer
 from ..report import ProgressBar, write_json
-from ..scenes import open_scene
+from ..scenes import open_scene, say_hints
 
 
 def run(args: Namespace, out: TextIO) -> None:
@@ -35,6 +35,7 @@ def run(args: Namespace, out: TextIO) -> None:
     check_output_file(args.output, (".png",), inputs=[args.scene])
 
     scene = open_scene(args.scene)
+    say_hints(scene, prompts)
     _check_atom(picture, atom, scene)
     camera, colours = choice.of(scene), HeatColours(args.colormap, args.span)
     with ProgressBar() as progress, open_renderer(args.backend, fade=args.fade, fill=args.fill) as renderer:
