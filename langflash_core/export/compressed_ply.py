@@ -17,7 +17,7 @@ import numpy as np
 
 from langflash_core.errors import SceneFileError
 from langflash_core.export.packing import check_some, from_smallest_three, morton_order, smallest_three
-from langflash_core.export.ply import bytes_of, read_elements, read_ply
+from langflash_core.export.ply import bytes_of, only_blanks, read_elements, read_ply
 from langflash_core.export.stored import Gathering, Rows, parts, to_scene
 from langflash_core.files import write_atomically
 from langflash_core.geometry.harmonics import MAX_SHOWN_DEGREE, SH_C0
@@ -60,7 +60,7 @@ def read_compressed_ply(path: Path) -> Scene:
                 raise SceneFileError(f"{path.name} has an element {name} that is not plain; {_REMEDY}")
             places[name] = (start, count, np.dtype([(field, order + kind) for kind, field in fields]))
             start += size
-        if start != path.stat().st_size:
+        if path.stat().st_size < start or not only_blanks(path, start):
             state = "cut off" if path.stat().st_size < start else "damaged"
             raise SceneFileError(
                 f"{path.name} is {state}: it needs {start:,} bytes, found {path.stat().st_size:,}; {_REMEDY}"
