@@ -51,6 +51,7 @@ _TYPES = {
 }
 _ORDERS = {"binary_little_endian": "<", "binary_big_endian": ">"}
 _MAX_HEADER = 1 << 16  # bytes; 3DGS headers have about 1,500
+HEADER_END = re.compile(rb"\nend_header[ \t]*\r?\n")
 _OWN = "stored as logit opacity, log scales"  # a comment that leaves nothing to guess
 _BLANKS = 16  # bytes of white space behind the last element, which are no damage
 _TOO_WIDE = 0.05  # of the scene: no capture is made of Gaussians that large
@@ -179,7 +180,7 @@ def read_elements(stream: BinaryIO, name: str) -> tuple[str, list["_Element"], i
         raise SceneFileError(f"{name} is an empty file; {_REMEDY}")
     if not re.match(rb"ply\s*\n", head):
         raise SceneFileError(f"{name} is not a PLY file, whatever its name says; {_REMEDY}")
-    ended = re.search(rb"\nend_header\r?\n", head)
+    ended = HEADER_END.search(head)
     if ended is None:
         state = "cut off inside its header" if len(head) < _MAX_HEADER else "damaged: its header does not end"
         raise SceneFileError(f"{name} is {state}; {_REMEDY}")
@@ -200,6 +201,8 @@ def _elements(lines: list[list[str]], name: str) -> tuple[str, list[_Element]]:
                 raise SceneFileError(f"{name} is an ascii PLY, this program reads binary ones; {_REMEDY}")
             case ["format", kind, *_] if kind in _ORDERS:
                 order = _ORDERS[kind]
+            case ["element", element, _] if element in [name for name, *_ in elements]:
+                raise SceneFileError(f"{name} has two elements {element}; {_REMEDY}")
             case ["element", element, count] if count.isdecimal() and len(count) <= _DIGITS:
                 elements.append((element, int(count), []))
             case ["property", "list", *_, field] if elements:
