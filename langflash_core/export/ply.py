@@ -129,8 +129,8 @@ def _encoded(gaussians: Gaussians, shift: Shift | None) -> Iterator[bytes]:
     names = (*MEANS, *_NORMALS, *DC, *rest, "opacity", *SCALES, *QUATS)
     lines = ["ply", "format binary_little_endian 1.0", f"comment LangFlash: {_OWN}"]
     lines += [] if shift is None else [shift_line(shift)]
-    kinds = {} if shift is None else dict.fromkeys(MEANS, "double")
-    properties = (f"property {kinds.get(name, 'float')} {name}" for name in names)
+    doubles = () if shift is None else MEANS
+    properties = (f"property {'double' if name in doubles else 'float'} {name}" for name in names)
     lines += [f"element vertex {len(gaussians)}", *properties, "end_header"]
     yield ("\n".join(lines) + "\n").encode()
     for part in parts(gaussians):

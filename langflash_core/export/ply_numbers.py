@@ -95,8 +95,12 @@ def numbers_of(rows: np.ndarray, head: bytes, name: str) -> Numbers:
     numbers = Numbers(row, None, SCALES[2] not in names, DC[0] not in names, said)
     if numbers.flat:
         said = (*said, f"Its Gaussians are flat (no scale_2); their third axis is {_THIN:g}.")
-    doubles = any(row[field].itemsize == 8 for field in MEANS)
-    shift = _shift(rows, head) if doubles else None
+    shift = _shift(rows, head)
+    if shift is not None and all(row[field].itemsize < 8 for field in MEANS):
+        step = float(np.spacing(np.float32(max(map(abs, shift)))))
+        blurred = f"so far from 0 ({told_shift(shift)}) that they have steps of {step:.2g}"
+        said = (*said, f"Its coordinates are {blurred}, in which small Gaussians are lost; write doubles.")
+        return replace(numbers, said=said)
     if shift is not None:
         off = f"{told_shift(shift)} is taken off them, and put back in a .ply"
         said = (*said, f"Its coordinates are far from 0: {off}.")

@@ -1,17 +1,20 @@
 """Numbers of .ply files that do not say how they are meant: read as the field reads them, or refused."""
 
 import io
+import json
 from contextlib import redirect_stdout
 from dataclasses import replace
 
 import numpy as np
 import pytest
 import torch
+from PIL import Image
 
 from langflash_core.errors import SceneFileError
 from langflash_core.export import export, read
 from langflash_core.geometry.harmonics import SH_C0
 from langflash_core.level import upright
+from langflash_core.lift import posed_views
 from langflash_core.records import World
 from langflash_core.request import ExportRequest
 from langflash_core.writing import write
@@ -21,7 +24,7 @@ from tests.export.splats import NAMES, ply_bytes, stored_columns
 SURVEYED = (448_262.0, 5_411_932.0, 117.0)  # metres east, north (UTM) and up
 
 
-def columns_of(count: int = 50, **changes) -> dict[str, np.ndarray]:
+def columns_of(count: int = 50, /, **changes: np.ndarray) -> dict[str, np.ndarray]:
     return {**stored_columns(count), **changes}
 
 
@@ -113,11 +116,38 @@ def test_surveyed_coordinates_keep_their_millimetres(tmp_path, order):
     (tmp_path / "a.ply").write_bytes(ply_bytes(columns, order))
     scene = read(tmp_path / "a.ply")
     shift = scene.record.shift
-    assert np.allclose(shift, SURVEYED, atol=3) and all(float(value).is_integer() for value in shift)
+    assert shift is not None and np.allclose(shift, SURVEYED, atol=3)
+    assert all(value.is_integer() for value in shift)
     assert f"{shift[1]:,.0f}" in scene.record.warnings[0] and "taken off" in scene.record.warnings[0]
     places = np.stack([columns[name] for name in "xyz"], 1)
     # Within 4 of 0, float32 rounds by at most 2^-23.
     assert np.abs(scene.gaussians.means.double().numpy() + shift - places).max() <= 2**-23
+
+
+def test_surveyed_coordinates_that_floats_have_blurred_already_are_said(tmp_path):
+    """Nobody gets the half metres back, but who made the file can write doubles."""
+    columns = surveyed()
+    (tmp_path / "a.ply").write_bytes(ply_bytes(columns | {n: columns[n].astype(np.float32) for n in "xyz"}))
+    record = read(tmp_path / "a.ply").record
+    assert record.shift is None
+    assert "steps of 0.5" in record.warnings[0] and "write doubles" in record.warnings[0]
+
+
+def test_poses_in_surveyed_coordinates_are_shifted_with_the_scene(tmp_path):
+    scene, photo = stripes(), io.BytesIO()
+    Image.new("RGB", (56, 42), (90, 120, 60)).save(photo, "JPEG")
+    posed = replace(scene, photos=(photo.getvalue(),) * scene.num_views)
+    posed = posed.with_record(photos=tuple(f"{view}.jpg" for view in range(scene.num_views)))
+    poses = tmp_path / "transforms.json"
+    export(posed, poses)
+    near = posed_views(poses, ())[1]
+    said = json.loads(poses.read_text())
+    for frame in said["frames"]:
+        for axis in range(3):
+            frame["transform_matrix"][axis][3] += SURVEYED[axis]
+    poses.write_text(json.dumps(said))
+    # A double has steps of 2^-30 there.
+    assert torch.allclose(posed_views(poses, (), SURVEYED)[1], near, atol=2e-9)
 
 
 def test_the_shift_is_put_back_in_a_ply_as_doubles(tmp_path):
