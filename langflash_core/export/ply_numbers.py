@@ -146,7 +146,7 @@ def _halves(rows: np.ndarray, name: str) -> tuple[np.dtype, tuple[str, ...]]:
     alike = all(row[field].str[1:] == "u2" for field in whole) and set(QUATS) <= set(whole)
     if not alike or not _sensible(rows.view(meant), own):
         kind = f"{whole[0]} as whole numbers ({row[whole[0]].name})"
-        raise SceneFileError(f"{name} stores {kind}, which say no size there; {REMEDY}")
+        raise SceneFileError(f"{name} stores {kind}, whose unit a .ply does not say; {REMEDY}")
     return meant, ("Its numbers are typed ushort and make sense as half floats, so they are read as these.",)
 
 
