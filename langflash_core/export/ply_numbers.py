@@ -26,7 +26,7 @@ SCALES = ("scale_0", "scale_1", "scale_2")
 QUATS = ("rot_0", "rot_1", "rot_2", "rot_3")
 REMEDY = "export it again as a binary 3D Gaussian Splatting .ply"
 
-_OWN = frozenset((*MEANS, *DC, "opacity", *SCALES, *QUATS))
+_OWN = frozenset((*MEANS, *DC, "opacity", *SCALES, *QUATS, "filter_3D"))
 _RGB = ("red", "green", "blue")
 _TOLD = re.compile(rb"\ncomment LangFlash: shift (\S+) (\S+) (\S+)\r?\n")
 _THIN = 1e-6  # of the third axis of flat Gaussians

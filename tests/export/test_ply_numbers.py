@@ -82,6 +82,7 @@ def test_few_rows_that_are_not_finite_do_not_make_halves_whole_numbers(tmp_path)
         (("opacity",), np.uint8),
         (("rot_0", "rot_1", "rot_2", "rot_3"), np.int8),
         (("f_dc_1",), np.int16),
+        (("filter_3D",), np.uint16),
     ],
 )
 @pytest.mark.parametrize("most", [100, 30_000, 65_536])
