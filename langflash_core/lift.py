@@ -26,6 +26,7 @@ from langflash_core.images.pictures import fitting_size
 from langflash_core.images.views import load_views
 from langflash_core.network import PRESETS, load_network
 from langflash_core.network.posed import posed_semantics
+from langflash_core.records import Shift
 from langflash_core.scene.assemble import sparse_weights
 from langflash_core.scene.bare import framing_camera
 from langflash_core.splat import render as render_reference
@@ -102,12 +103,13 @@ def lift(
     return _spoken(scene, views, cameras, sums, totals, dictionary, network.calibration)
 
 
-def posed_views(poses: Path, photos: Sequence[Path]) -> tuple[Views, Tensor]:
+def posed_views(poses: Path, photos: Sequence[Path], shift: Shift | None = None) -> tuple[Views, Tensor]:
     """Photos as the network sees them, and their poses (V, 4, 4) in their own world.
 
     Args:
         poses: a transforms.json, or a COLMAP text model. photos: those to take; none: all, at most 8,
-            evenly chosen.
+            evenly chosen. shift: what was taken off the scene's coordinates, as its record has it; it is
+            taken off the poses, too.
 
     Raises:
         SceneFileError: the poses cannot be used. ImageError: a photo cannot.
@@ -117,7 +119,10 @@ def posed_views(poses: Path, photos: Sequence[Path]) -> tuple[Views, Tensor]:
     posed = posed.of(posed.paths[::step])
     preset = PRESETS[PRESET]
     views = load_views(posed.paths, area=preset.native_area, multiple=preset.patch, **posed.lens())
-    return views, posed.viewmats.float()
+    viewmats = posed.viewmats.clone()
+    if shift is not None:
+        viewmats[:, :3, 3] += viewmats[:, :3, :3] @ torch.tensor(shift, dtype=viewmats.dtype)
+    return views, viewmats.float()
 
 
 def cameras_around(scene: Scene, count: int = VIEWS, up: str = UP) -> list[Camera]:

@@ -40,6 +40,7 @@ _HEAD = struct.Struct("<4sIIBBBB")  # magic, version, count, degree, fractional 
 _ZSTD_HEAD = 32  # bytes: _HEAD, the place of the table of contents, 12 spare ones
 _ANTIALIASED, _EXTENDED = 1, 2  # flags
 _AXES_EXTENSION = 0xADBE0003
+_MOST_EXTENSIONS = 1 << 20  # bytes of versions 2 and 3, which do not say how many there are
 _STORED_AXES = "RUB"
 # By the extension's number, from 1.
 _NAMED_AXES = (
@@ -87,7 +88,7 @@ def read_spz(path: Path) -> Scene:
         header, streams, extensions = _unzipped(content, path.name)
     else:
         header, streams, extensions = _unpacked(content, path.name)
-    matrix = axes_matrix(_axes(extensions)).T  # to ours
+    matrix = axes_matrix(_axes(extensions, path.name)).T  # to ours
     gathering = Gathering(header.count, header.num_shown, path.name)
     for first in range(0, header.count, ROWS_AT_ONCE):
         gathering.add(turned(_rows(header, streams, slice(first, first + ROWS_AT_ONCE)), matrix))
@@ -136,7 +137,9 @@ def _unzipped(content: bytes, name: str) -> tuple[_Header, list[bytes], bytes]:
         )
     needed = sum(header.sizes())
     _check_shrinking(needed, len(content), name)
-    after = 1 << 12 if header.flags & _EXTENDED else 1  # asked for, so that an end that is missing shows
+    after = (
+        _MOST_EXTENSIONS if header.flags & _EXTENDED else 1
+    )  # asked for, so that an end that is missing shows
     plain = inflated(content, _HEAD.size + needed + after, name, wbits=31)
     if len(plain) < _HEAD.size + needed:
         raise SceneFileError(
@@ -202,14 +205,23 @@ def _check_shrinking(needed: int, found: int, name: str) -> None:
         )
 
 
-def _axes(extensions: bytes) -> str:
-    """The axes that the records of an extension area name, or the format's own."""
+def _axes(extensions: bytes, name: str) -> str:
+    """The axes that the records of an extension area name, or the format's own.
+
+    Raises:
+        SceneFileError: they are none that are known, or the records go on beyond what is there.
+    """
     start = 0
     while start + 8 <= len(extensions):
         kind, size = struct.unpack_from("<II", extensions, start)
         value = extensions[start + 8 : start + 8 + size]
-        if kind == _AXES_EXTENSION and size == 4 and 1 <= int.from_bytes(value, "little") <= 16:
-            return _NAMED_AXES[int.from_bytes(value, "little") - 1]
+        if len(value) < size:
+            raise SceneFileError(f"{name} has an extension {kind:#x} of {size:,} bytes, cut off; {_REMEDY}")
+        number = int.from_bytes(value[:4], "little")
+        if kind == _AXES_EXTENSION and (size != 4 or number > len(_NAMED_AXES)):
+            raise SceneFileError(f"{name} names axes {number}, this program knows 1 to 16; {_REMEDY}")
+        if kind == _AXES_EXTENSION and number:  # 0: unspecified
+            return _NAMED_AXES[number - 1]
         start += 8 + size
     return _STORED_AXES
 

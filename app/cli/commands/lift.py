@@ -33,7 +33,9 @@ def run(args: Namespace, out: TextIO) -> None:
     from langflash_core.files import make_folder
     from langflash_core.lift import lift, posed_views
 
-    views, viewmats = posed_views(args.poses, args.photos or ()) if args.poses else (None, None)
+    views, viewmats = None, None
+    if args.poses:
+        views, viewmats = posed_views(args.poses, args.photos or (), scene.record.shift)
     with ProgressBar() as progress, open_renderer(args.backend) as renderer:
         lifted = lift(
             scene,
