@@ -166,7 +166,8 @@ def _guess_from_json(values: Mapping[str, Any]) -> Guess:
 class Record:
     """What is known of a scene besides its tensors. Mappings hold plain JSON values; empty: unknown.
 
-    preset: of the network. source: the splat file it came from. photos: names, one per view.
+    preset: of the network. source: the splat file it came from. antialiased: its splats were trained to be
+    drawn so, which splat files say. photos: names, one per view.
     warnings: a sentence each. metric_scale: metres per scene unit. network_unit: the network's
     length units per scene unit. counts: Gaussians predicted and left out. pruning: as `prune` left
     it. refinement: what a fit to the photos brought. detail: what was spent on how fine elements, and what
@@ -187,6 +188,7 @@ class Record:
 
     preset: str | None = None
     source: str | None = None
+    antialiased: bool = False
     photos: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
     metric_scale: float | None = None

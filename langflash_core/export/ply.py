@@ -17,8 +17,9 @@ import numpy as np
 from numpy.lib.recfunctions import structured_to_unstructured
 
 from langflash_core.errors import SceneFileError
+from langflash_core.export.antialiased import filter_of, filtered, ply_comments, ply_model
 from langflash_core.export.language import packed_language, side_car, speaks, with_language
-from langflash_core.export.stored import ROWS_AT_ONCE, Gathering, Rows, logit, parts, to_scene
+from langflash_core.export.stored import ANTIALIASED, ROWS_AT_ONCE, Gathering, Rows, logit, parts, to_scene
 from langflash_core.files import write_atomically
 from langflash_core.geometry.harmonics import MAX_SHOWN_DEGREE
 from langflash_core.types import Gaussians, Scene
@@ -75,15 +76,17 @@ def read_ply(path: Path) -> Scene:
         stream.seek(layout.start)
         for first in range(0, layout.count, ROWS_AT_ONCE):
             rows = np.fromfile(stream, layout.row, min(ROWS_AT_ONCE, layout.count - first))
-            gathering.add(_columns(rows, num_bases))
+            gathering.add(_filtered(_columns(rows, num_bases), rows))
     stored, warnings = gathering.stored(), []
-    logits = layout.own or not _looks_activated(stored.opacities)
-    logs = layout.own or not _looks_linear(stored)
+    mip = filter_of(layout.row.names) is not None  # whose writer stores logarithms and logits
+    logits = layout.own or mip or not _looks_activated(stored.opacities)
+    logs = layout.own or mip or not _looks_linear(stored)
     if not logits:
         warnings.append("All opacities lie between 0 and 1, so they are taken as they are, not as logits.")
     if not logs:
         warnings.append("The scales are no logarithms (they would fill the scene); taken as lengths.")
-    scene = to_scene(gathering, path.name, warnings, logs=logs, logits=logits)
+    model = ANTIALIASED if mip else ply_model(path)
+    scene = to_scene(gathering, path.name, warnings, logs=logs, logits=logits, model=model)
     beside = side_car(path)
     return with_language(scene, beside.read_bytes(), beside.name) if beside.is_file() else scene
 
@@ -94,16 +97,16 @@ def write_ply(scene: Scene, path: Path) -> None:
     Raises:
         OutputError: the path cannot be written.
     """
-    write_atomically(path, _encoded(scene.gaussians))
+    write_atomically(path, _encoded(scene.gaussians, ply_comments(scene)))
     if speaks(scene):
         write_atomically(side_car(path), packed_language(scene))
 
 
-def _encoded(gaussians: Gaussians) -> Iterator[bytes]:
+def _encoded(gaussians: Gaussians, comments: list[str]) -> Iterator[bytes]:
     num_bases = min(gaussians.sh.shape[1], (MAX_SHOWN_DEGREE + 1) ** 2)
     rest = [f"f_rest_{index}" for index in range(3 * (num_bases - 1))]
     names = (*_MEANS, *_NORMALS, *_DC, *rest, "opacity", *_SCALES, *_QUATS)
-    lines = ["ply", "format binary_little_endian 1.0", f"comment LangFlash: {_OWN}"]
+    lines = ["ply", "format binary_little_endian 1.0", f"comment LangFlash: {_OWN}", *comments]
     lines += [f"element vertex {len(gaussians)}", *(f"property float {name}" for name in names), "end_header"]
     yield ("\n".join(lines) + "\n").encode()
     for part in parts(gaussians):
@@ -237,6 +240,11 @@ def _columns(rows: np.ndarray, num_bases: int) -> Rows:
         rest = block(tuple(f"f_rest_{index}" for index in range(3 * (num_bases - 1))))
         sh[:, 1:] = rest.reshape(-1, 3, num_bases - 1).transpose(0, 2, 1)
     return Rows(block(_MEANS), block(_QUATS), block(_SCALES), block(("opacity",))[:, 0], sh)
+
+
+def _filtered(stored: Rows, rows: np.ndarray) -> Rows:
+    name = filter_of(rows.dtype.names)
+    return stored if name is None else filtered(stored, rows[name])
 
 
 def _looks_activated(opacities: np.ndarray) -> bool:

@@ -28,7 +28,7 @@ def run(args: Namespace, out: TextIO) -> None:
     prepared(request)
     for path in (args.scene, *args.beside):
         readable_file(path, "scene", SceneFileError)
-    scene = open_scene(args.scene)
+    scene = open_scene(args.scene, request.axes_of(args.scene))
     with ProgressBar() as progress:
         said = write(scene, request, renderers=partial(open_renderer, args.backend), progress=progress)
     print(f"{args.output}: {said}", file=out)
