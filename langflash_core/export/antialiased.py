@@ -14,7 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
-from langflash_core.export.stored import ANTIALIASED, PLAIN, Rows, logit
+from langflash_core.export.stored import ANTIALIASED, FLAT, PLAIN, Rows, logit
 from langflash_core.types import Scene
 
 _FILTER = "filter_3d"
@@ -27,9 +27,10 @@ _MOST_HEADER = 1 << 16  # bytes
 def ply_model(path: Path) -> str:
     """What the comments of a .ply's header say that its splats are, as `to_scene` takes it."""
     with path.open("rb") as stream:
-        header = stream.read(_MOST_HEADER).split(b"end_header", 1)[0]
+        header = stream.read(_MOST_HEADER).split(b"\nend_header", 1)[0]
     marks = [b"".join(mark).decode("latin-1").lower() for mark in _MARK.findall(header)]
-    return _MODELS.get(marks[-1], marks[-1]) if marks else PLAIN
+    model = _MODELS.get(marks[-1], marks[-1]) if marks else PLAIN
+    return PLAIN if model == FLAT and b" scale_2" not in header else model  # flat is then how it is read
 
 
 def ply_comments(scene: Scene) -> list[str]:

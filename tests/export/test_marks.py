@@ -91,6 +91,7 @@ def test_the_marks_stand_where_other_programs_look_for_them(tmp_path):
         (["SplatRenderMode: mip", "antialiased 0"], False),  # the last one wins
         (["antialiased 0", "SplatRenderMode: mip"], True),
         (["not antialiased 1"], False),
+        (["a comment on end_header", "antialiased 1"], True),
         ([], False),
     ],
 )
@@ -110,6 +111,7 @@ def test_what_stands_behind_the_header_is_no_comment(tmp_path):
 def test_splats_of_a_kind_that_is_not_known_are_said(tmp_path):
     scene = ply(tmp_path, "BEFORE comment SplatRenderMode: foam")
     assert scene.record.warnings and "not known here (foam)" in scene.record.warnings[0]
+    assert "flat splats" in ply(tmp_path, "BEFORE comment SplatRenderMode: 2dgs").record.warnings[0]
     export(made(False), tmp_path / "meta.json")
     meta = json.loads((tmp_path / "meta.json").read_bytes())
     for model, said in (("2dgs", "flat splats"), ("foam", "not known here (foam)"), ("default", "")):
