@@ -65,9 +65,8 @@ def with_language(scene: Scene, block: bytes, name: str) -> Scene:
         fields, described = _unpacked(block)
         if described["positions"] != _fingerprint(scene.gaussians):
             return _warned(scene, f"{name} belongs to other Gaussians than these; they were read without it.")
-        photos = tuple(
-            fields[photo].numpy().tobytes() for photo in sorted(f for f in fields if f.startswith("photo_"))
-        )
+        names = sorted((f for f in fields if f.startswith("photo_")), key=lambda name: (len(name), name))
+        photos = tuple(fields[photo].numpy().tobytes() for photo in names)
         for limit, part in ((ATOMS, "dictionary"), (VIEWS, "viewmats")):
             if limit.passed_by(len(fields[part])):
                 raise ValueError(f"{len(fields[part]):,} {limit.name}; {limit.remedy()}")

@@ -43,6 +43,7 @@ _HEAD = struct.Struct("<4sIIBBBB")  # magic, version, count, degree, fractional 
 _ZSTD_HEAD = 32  # bytes: _HEAD, the place of the table of contents, 12 spare ones
 _SMOOTHED, _EXTENDED = 1, 2  # flags
 _AXES_EXTENSION = 0xADBE0003
+_MOST_EXTENSIONS = 1 << 20  # bytes of versions 2 and 3, which do not say how many there are
 _STORED_AXES = "RUB"
 _ON_ITS_HEAD = (
     "The scene seems to stand on its head; if SuperSplat or splat-transform wrote it, read it with --axes "
@@ -92,7 +93,7 @@ def read_spz(path: Path, *, axes: str | None = None) -> Scene:
         header, streams, extensions = _unzipped(content, path.name)
     else:
         header, streams, extensions = _unpacked(content, path.name)
-    named = _named_axes(extensions)
+    named = _named_axes(extensions, path.name)
     matrix = axes_matrix(named or axes or _STORED_AXES).T  # to ours
     gathering = Gathering(header.count, header.num_shown, path.name)
     for first in range(0, header.count, ROWS_AT_ONCE):
@@ -144,7 +145,9 @@ def _unzipped(content: bytes, name: str) -> tuple[_Header, list[bytes], bytes]:
         )
     needed = sum(header.sizes())
     _check_shrinking(needed, len(content), name)
-    after = 1 << 12 if header.flags & _EXTENDED else 1  # asked for, so that an end that is missing shows
+    after = (
+        _MOST_EXTENSIONS if header.flags & _EXTENDED else 1
+    )  # asked for, so that an end that is missing shows
     plain = inflated(content, _HEAD.size + needed + after, name, wbits=31)
     if len(plain) < _HEAD.size + needed:
         raise SceneFileError(
@@ -210,14 +213,23 @@ def _check_shrinking(needed: int, found: int, name: str) -> None:
         )
 
 
-def _named_axes(extensions: bytes) -> str | None:
-    """The axes that the records of an extension area name."""
+def _named_axes(extensions: bytes, name: str) -> str | None:
+    """The axes that the records of an extension area name.
+
+    Raises:
+        SceneFileError: they are none that are known, or the records go on beyond what is there.
+    """
     start = 0
     while start + 8 <= len(extensions):
         kind, size = struct.unpack_from("<II", extensions, start)
         value = extensions[start + 8 : start + 8 + size]
-        if kind == _AXES_EXTENSION and size == 4 and 1 <= int.from_bytes(value, "little") <= 16:
-            return AXES[int.from_bytes(value, "little") - 1]
+        if len(value) < size:
+            raise SceneFileError(f"{name} has an extension {kind:#x} of {size:,} bytes, cut off; {_REMEDY}")
+        number = int.from_bytes(value[:4], "little")
+        if kind == _AXES_EXTENSION and (size != 4 or number > len(AXES)):
+            raise SceneFileError(f"{name} names axes {number}, this program knows 1 to 16; {_REMEDY}")
+        if kind == _AXES_EXTENSION and number:  # 0: unspecified
+            return AXES[number - 1]
         start += 8 + size
     return None
 

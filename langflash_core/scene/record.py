@@ -5,7 +5,9 @@ from run to run, and equal photos are to give equal files. Keys that this versio
 read into `Record.others` and written back as they are.
 """
 
-from langflash_core.records import Cost, Record, world_from_json, world_to_json
+import math
+
+from langflash_core.records import Cost, Record, Shift, world_from_json, world_to_json
 from langflash_core.scene.tour import read_tour, told_tour
 
 _COST = ("timings", "seconds", "peak_memory_mb")
@@ -28,6 +30,7 @@ def to_json(record: Record) -> dict:
     known["atom_denials"] = {str(k): list(said) for k, said in record.atom_denials.items()}
     known["silent_atoms"] = record.silent_atoms
     known["lone_atoms"] = record.lone_atoms
+    known["shift"] = record.shift
     known["world"] = None if record.world is None else world_to_json(record.world)
     known["thing_names"] = dict(record.thing_names)
     known["camera_path"] = record.camera_path
@@ -56,7 +59,7 @@ def from_json(values: dict) -> Record:
     world, things = _of_type(values, "world", dict), _of_type(values, "thing_names", dict) or {}
     ours = {
         *known, "atom_names", "atom_denials", "silent_atoms", "lone_atoms", "edits", "camera_path", "tour",
-        "world", "thing_names", "antialiased", _VERSION_1, *_COST,
+        "world", "thing_names", "shift", "antialiased", _VERSION_1, *_COST,
     }  # fmt: skip
     return Record(
         **{name: value for name, value in known.items() if value is not None},
@@ -65,6 +68,7 @@ def from_json(values: dict) -> Record:
         silent_atoms=tuple(_list(values, "silent_atoms", int)),
         lone_atoms=tuple(_list(values, "lone_atoms", int)),
         world=None if world is None else world_from_json(world),
+        shift=_shift(values),
         thing_names={str(thing): str(name) for thing, name in things.items()},
         camera_path=tuple(_list(values, "camera_path", dict)),
         tour=told_tour(read_tour(_of_type(values, "tour", dict) or {})),
@@ -82,6 +86,16 @@ def from_json(values: dict) -> Record:
 def counts_per_view(values: dict) -> list[int]:
     """How many Gaussians each view made, in order, as files of version 1 say it; [] where they do not."""
     return _list(values, _VERSION_1, int)
+
+
+def _shift(values: dict) -> Shift | None:
+    found = _of_type(values, "shift", list)
+    if found is None:
+        return None
+    if len(found) != 3 or not all(type(value) in (int, float) and math.isfinite(value) for value in found):
+        raise ValueError(f"shift: expected three finite numbers, received {found!r}")
+    x, y, z = map(float, found)
+    return x, y, z
 
 
 def _of_type(values: dict, name: str, *types: type):

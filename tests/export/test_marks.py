@@ -150,6 +150,17 @@ def test_the_filter_is_written_as_what_it_did(tmp_path):
     assert torch.allclose(again.gaussians.opacities, found.gaussians.opacities, atol=1e-6)
 
 
+def test_a_filter_of_half_floats_typed_ushort(tmp_path):
+    columns = {**stored_columns(), "filter_3D": np.full(50, 0.01, np.float32)}
+    halves = {name: values.astype(np.float16) for name, values in columns.items()}
+    (tmp_path / "a.ply").write_bytes(ply_bytes({name: each.view(np.uint16) for name, each in halves.items()}))
+    found = read(tmp_path / "a.ply")
+    meant = ply(tmp_path, **{name: values.astype(np.float32) for name, values in halves.items()})
+    assert found.record.antialiased and SAID in found.record.warnings
+    assert torch.equal(found.gaussians.scales, meant.gaussians.scales)
+    assert torch.equal(found.gaussians.opacities, meant.gaussians.opacities)
+
+
 def test_filters_that_are_no_numbers_leave_their_splats_out(tmp_path):
     radii = np.full(50, 0.01, np.float32)
     radii[:2] = np.nan, np.inf
