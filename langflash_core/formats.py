@@ -59,6 +59,12 @@ PHOTOS_IN = (
 )
 """Photos, by every usual name of what `picture_files.py` opens; but .pfm, which are depth beside photos."""
 LARGEST_SIDE = 8192  # pixels of a picture; GL 3.3 promises no larger texture on most drivers
+AXES = (
+    "ldb", "rdb", "lub", "rub", "ldf", "rdf", "luf", "ruf", "lfd", "rfd", "lfu", "rfu", "lbd", "rbd", "lbu",
+    "rbu",
+)  # fmt: skip
+"""Where +x, +y and +z of a .spz may point: right or left, up or down, front or back; in the order of their
+numbers in such files, from 1. A `Scene` is rdf."""
 _WHOLE_NAMES = (SOG_FOLDER, "cameras.txt", "transforms.json")
 
 

@@ -24,6 +24,7 @@ from langflash_core.geometry.cameras import invert_rigid
 from langflash_core.geometry.turning import axes_matrix
 from langflash_core.images.pictures import fitting_size
 from langflash_core.images.views import load_views
+from langflash_core.level import on_its_head
 from langflash_core.network import PRESETS, load_network
 from langflash_core.network.posed import posed_semantics
 from langflash_core.records import Shift
@@ -100,7 +101,20 @@ def lift(
         raise InputError("the network finds no part in these views; give photos that show more of the scene")
     sums, totals = _carried_back(scene, cameras, maps, frames, progress, cancelled)
     progress("done", 1.0)
-    return _spoken(scene, views, cameras, sums, totals, dictionary, network.calibration)
+    lifted = _spoken(scene, views, cameras, sums, totals, dictionary, network.calibration)
+    return lifted if photos is not None else _with_hint(lifted, up)
+
+
+def _with_hint(lifted: Scene, up: str) -> Scene:
+    """With a warning, where by its own words it stands on its head."""
+    if not on_its_head(lifted, -axes_matrix(_TO_DOWN[up])[1].numpy()):
+        return lifted
+    other = up[1:] if up.startswith("-") else f"-{up}"
+    hint = (
+        "What is called floor lies above what is called ceiling, so the scene seems to stand on its head; "
+        f"lift it again with --up={other}, or a .spz of SuperSplat with --axes rdf."
+    )
+    return lifted.with_record(warnings=(*lifted.record.warnings, hint))
 
 
 def posed_views(poses: Path, photos: Sequence[Path], shift: Shift | None = None) -> tuple[Views, Tensor]:

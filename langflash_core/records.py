@@ -174,7 +174,8 @@ def told_shift(shift: Shift) -> str:
 class Record:
     """What is known of a scene besides its tensors. Mappings hold plain JSON values; empty: unknown.
 
-    preset: of the network. source: the splat file it came from. photos: names, one per view.
+    preset: of the network. source: the splat file it came from. antialiased: its splats were trained to be
+    drawn so, which splat files say. photos: names, one per view.
     warnings: a sentence each. metric_scale: metres per scene unit. network_unit: the network's
     length units per scene unit. shift: what was taken off the positions of a splat file far from 0, to be put
     back where they are written as doubles; None: nothing. counts: Gaussians predicted and left out. pruning:
@@ -196,6 +197,7 @@ class Record:
 
     preset: str | None = None
     source: str | None = None
+    antialiased: bool = False
     photos: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
     metric_scale: float | None = None

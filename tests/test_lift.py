@@ -91,7 +91,7 @@ def test_a_plain_wall_gets_its_stripes_back(known_network):
     truth = known_network.semantics.dense_weights().argmax(-1)
     right = (lifted.semantics.dense_weights().argmax(-1) == truth).float().mean()
     assert float(right) > 0.97  # at the borders a pixel shows two stripes
-    assert lifted.record.calibration == {"threshold": 0.5}
+    assert lifted.record.calibration == {"threshold": 0.5} and lifted.record.warnings == ()
     assert steps[-1] == "done" and {"drawing", "network", "carrying back"} < set(steps)
 
 
@@ -111,6 +111,22 @@ def test_views_that_show_nothing_are_refused(known_network):
     gaussians = replace(known_network.gaussians, opacities=torch.full((len(known_network.gaussians),), 1e-3))
     with pytest.raises(InputError, match="almost nothing"):
         lift(bare_scene(gaussians, "mist.ply"))
+
+
+@pytest.mark.parametrize(("up", "other"), [("-y", "y"), ("z", "-z"), ("x", "-x")])
+def test_a_scene_on_its_head_is_told_the_other_way_up(known_network, monkeypatch, up, other):
+    asked = []
+
+    def hangs(scene, upward):
+        asked.append(upward.tolist())
+        return True
+
+    monkeypatch.setattr("langflash_core.lift.on_its_head", hangs)
+    lifted = lift(bare_scene(known_network.gaussians, "wall.ply"), up=up)
+    expected = [0.0, 0.0, 0.0]
+    expected["xyz".index(up[-1])] = -1.0 if up.startswith("-") else 1.0
+    assert asked == [expected]
+    assert f"--up={other}," in lifted.record.warnings[-1]
 
 
 def test_lifting_stops_when_asked(known_network):

@@ -10,8 +10,11 @@ from langflash_core.types import NO_LANGUAGE, Scene
 from .report import say_warnings
 
 
-def open_scene(path: Path) -> Scene:
+def open_scene(path: Path, axes: str | None = None) -> Scene:
     """Read a scene; what a splat file left to guess or to leave out is said on stderr.
+
+    Args:
+        axes: as `export.read` takes them.
 
     Raises:
         SceneFileError: missing, damaged, or of a kind that this program does not read.
@@ -19,7 +22,7 @@ def open_scene(path: Path) -> Scene:
     readable_file(path, "scene", SceneFileError)
     from langflash_core.export import read
 
-    scene = read(path)
+    scene = read(path, axes=axes)
     if scene.semantics.space == NO_LANGUAGE:
         say_warnings(scene.record.warnings)
     return scene

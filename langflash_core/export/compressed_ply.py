@@ -17,6 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from langflash_core.errors import SceneFileError
+from langflash_core.export.antialiased import ply_comments, ply_model
 from langflash_core.export.packing import check_some, from_smallest_three, morton_order, smallest_three
 from langflash_core.export.ply import HEADER_END, bytes_of, only_blanks, read_elements, read_ply
 from langflash_core.export.stored import Gathering, Rows, parts, to_scene
@@ -74,7 +75,7 @@ def read_compressed_ply(path: Path) -> Scene:
         gathering = Gathering(count, 1 + num_rest // 3, path.name)
         for first in range(0, count, _AT_ONCE * _CHUNK):
             gathering.add(_rows(stream, places, first, num_rest))
-    return to_scene(gathering, path.name, [], logs=True, logits=False)
+    return to_scene(gathering, path.name, [], logs=True, logits=False, model=ply_model(path))
 
 
 def write_compressed_ply(scene: Scene, path: Path) -> None:
@@ -84,7 +85,7 @@ def write_compressed_ply(scene: Scene, path: Path) -> None:
         OutputError: there is nothing to write, or the path cannot be written.
     """
     check_some(scene.gaussians, path)
-    write_atomically(path, _encoded(scene.gaussians))
+    write_atomically(path, _encoded(scene.gaussians, ply_comments(scene)))
 
 
 def _check_elements(places: dict[str, tuple[int, int, np.dtype]], name: str) -> int:
@@ -158,7 +159,7 @@ def _fields(words: np.ndarray, shifts: tuple[int, ...], bits: tuple[int, ...]) -
     return ((words[:, None].astype(np.uint32) >> np.array(shifts, np.uint32)) & tops) / tops
 
 
-def _encoded(gaussians: Gaussians) -> Iterator[bytes]:
+def _encoded(gaussians: Gaussians, comments: list[str]) -> Iterator[bytes]:
     num_bases = min(gaussians.sh.shape[1], (MAX_SHOWN_DEGREE + 1) ** 2)
     count, num_rest = len(gaussians), 3 * (num_bases - 1)
     order = morton_order(gaussians.means.detach().cpu().double().numpy())
@@ -171,7 +172,8 @@ def _encoded(gaussians: Gaussians) -> Iterator[bytes]:
             words.append(packed)
         flat = part.sh[:, 1:num_bases].transpose(0, 2, 1).reshape(len(part.means), num_rest)
         rest.append(np.clip(np.trunc((flat / _SH_SPAN + 0.5) * 256), 0, 255).astype(np.uint8).tobytes())
-    lines = ["ply", "format binary_little_endian 1.0", "comment LangFlash", f"element chunk {len(bounds)}"]
+    lines = ["ply", "format binary_little_endian 1.0", "comment LangFlash", *comments]
+    lines += [f"element chunk {len(bounds)}"]
     lines += [f"property float {name}" for name in _BOUNDS]
     lines += [f"element vertex {count}", *(f"property uint {name}" for name in _WORDS)]
     if num_rest:

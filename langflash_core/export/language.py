@@ -70,6 +70,7 @@ def with_language(scene: Scene, block: bytes, name: str) -> Scene:
         for limit, part in ((ATOMS, "dictionary"), (VIEWS, "viewmats")):
             if limit.passed_by(len(fields[part])):
                 raise ValueError(f"{len(fields[part]):,} {limit.name}; {limit.remedy()}")
+        known = from_json(dict(described["metadata"]))
         width, height = (int(side) for side in described["view_size"])
         whole = replace(
             scene,
@@ -84,7 +85,7 @@ def with_language(scene: Scene, block: bytes, name: str) -> Scene:
             view_size=(width, height),
             photos=photos,
             view_ids=fields["view_ids"].long() if "view_ids" in fields else None,
-            record=from_json(dict(described["metadata"])),
+            record=replace(known, antialiased=known.antialiased or scene.record.antialiased),
             levels=fields.get("levels"),
             confidences=fields["confidences"].float() / 255 if "confidences" in fields else None,
         )

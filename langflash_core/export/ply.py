@@ -17,6 +17,7 @@ from typing import BinaryIO
 import numpy as np
 
 from langflash_core.errors import SceneFileError
+from langflash_core.export.antialiased import filter_of, filtered, ply_comments, ply_model
 from langflash_core.export.language import packed_language, side_car, speaks, with_language
 from langflash_core.export.ply_numbers import (
     DC,
@@ -30,7 +31,7 @@ from langflash_core.export.ply_numbers import (
     shift_line,
 )
 from langflash_core.export.ply_numbers import REMEDY as _REMEDY
-from langflash_core.export.stored import ROWS_AT_ONCE, Gathering, Rows, logit, parts, to_scene
+from langflash_core.export.stored import ANTIALIASED, ROWS_AT_ONCE, Gathering, Rows, logit, parts, to_scene
 from langflash_core.files import write_atomically
 from langflash_core.geometry.harmonics import MAX_SHOWN_DEGREE
 from langflash_core.records import Shift
@@ -90,23 +91,25 @@ def read_ply(path: Path) -> Scene:
         stream.seek(layout.start)
         for first in range(0, layout.count, ROWS_AT_ONCE):
             rows = np.fromfile(stream, numbers.row, min(ROWS_AT_ONCE, layout.count - first))
-            gathering.add(_columns(rows, num_bases, numbers))
-    scene = _activated(gathering, numbers, path.name, own=layout.own)
+            gathering.add(_filtered(_columns(rows, num_bases, numbers), rows))
+    model = ANTIALIASED if filter_of(layout.row.names) else ply_model(path)
+    scene = _activated(gathering, numbers, path.name, layout, model)
     beside = side_car(path)
     return with_language(scene, beside.read_bytes(), beside.name) if beside.is_file() else scene
 
 
-def _activated(gathering: Gathering, numbers: Numbers, name: str, *, own: bool) -> Scene:
-    """The scene of gathered rows. own: this program wrote them, so that nothing is left to guess."""
+def _activated(gathering: Gathering, numbers: Numbers, name: str, layout: _Layout, model: str) -> Scene:
+    """The scene of gathered rows. model: as `to_scene` takes it."""
     stored, warnings = gathering.stored(), list(numbers.said)
-    logits = own or not _looks_activated(stored.opacities)
-    logs = own or not _looks_linear(stored)
+    known = layout.own or filter_of(layout.row.names) is not None  # whose writers leave nothing to guess
+    logits = known or not _looks_activated(stored.opacities)
+    logs = known or not _looks_linear(stored)
     if not logits:
         warnings.append("All opacities lie between 0 and 1, so they are taken as they are, not as logits.")
     if not logs:
         warnings.append("The scales are no logarithms (they would fill the scene); taken as lengths.")
     numbers.complete(stored, name, logs=logs)
-    scene = to_scene(gathering, name, warnings, logs=logs, logits=logits)
+    scene = to_scene(gathering, name, warnings, logs=logs, logits=logits, model=model)
     return scene if numbers.shift is None else scene.with_record(shift=numbers.shift)
 
 
@@ -118,16 +121,16 @@ def write_ply(scene: Scene, path: Path) -> None:
     Raises:
         OutputError: the path cannot be written.
     """
-    write_atomically(path, _encoded(scene.gaussians, scene.record.shift))
+    write_atomically(path, _encoded(scene.gaussians, scene.record.shift, ply_comments(scene)))
     if speaks(scene):
         write_atomically(side_car(path), packed_language(scene))
 
 
-def _encoded(gaussians: Gaussians, shift: Shift | None) -> Iterator[bytes]:
+def _encoded(gaussians: Gaussians, shift: Shift | None, comments: list[str]) -> Iterator[bytes]:
     num_bases = min(gaussians.sh.shape[1], (MAX_SHOWN_DEGREE + 1) ** 2)
     rest = [f"f_rest_{index}" for index in range(3 * (num_bases - 1))]
     names = (*MEANS, *_NORMALS, *DC, *rest, "opacity", *SCALES, *QUATS)
-    lines = ["ply", "format binary_little_endian 1.0", f"comment LangFlash: {_OWN}"]
+    lines = ["ply", "format binary_little_endian 1.0", f"comment LangFlash: {_OWN}", *comments]
     lines += [] if shift is None else [shift_line(shift)]
     doubles = () if shift is None else MEANS
     properties = (f"property {'double' if name in doubles else 'float'} {name}" for name in names)
@@ -272,6 +275,11 @@ def _columns(rows: np.ndarray, num_bases: int, numbers: Numbers) -> Rows:
         sh[:, 1:] = rest.reshape(-1, 3, num_bases - 1).transpose(0, 2, 1)
     opacities = block(rows, ("opacity",))[:, 0]
     return Rows(numbers.means(rows), block(rows, QUATS), numbers.scales(rows), opacities, sh)
+
+
+def _filtered(stored: Rows, rows: np.ndarray) -> Rows:
+    name = filter_of(rows.dtype.names)
+    return stored if name is None else filtered(stored, rows[name])
 
 
 def _looks_activated(opacities: np.ndarray) -> bool:

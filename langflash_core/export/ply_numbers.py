@@ -16,6 +16,7 @@ import numpy as np
 from numpy.lib.recfunctions import structured_to_unstructured
 
 from langflash_core.errors import SceneFileError
+from langflash_core.export.antialiased import filter_of
 from langflash_core.export.stored import Rows
 from langflash_core.geometry.harmonics import SH_C0
 from langflash_core.records import Shift, told_shift
@@ -133,7 +134,11 @@ def _halves(rows: np.ndarray, name: str) -> tuple[np.dtype, tuple[str, ...]]:
         SceneFileError: they are whole numbers otherwise.
     """
     row = rows.dtype
-    own = [field for field in row.names or () if field in _OWN or field.startswith("f_rest_")]
+    own = [
+        field
+        for field in row.names or ()
+        if field in _OWN or field.startswith("f_rest_") or filter_of((field,))
+    ]
     whole = [field for field in own if row[field].kind in "iu"]
     if not whole:
         return row, ()

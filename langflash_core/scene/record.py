@@ -35,6 +35,7 @@ def to_json(record: Record) -> dict:
     known["thing_names"] = dict(record.thing_names)
     known["camera_path"] = record.camera_path
     known["tour"] = record.tour
+    known["antialiased"] = record.antialiased or None
     known["edits"] = {"deleted": record.num_deleted} if record.num_deleted else None
     written = {
         name: list(value) if isinstance(value, tuple) else value
@@ -58,7 +59,7 @@ def from_json(values: dict) -> Record:
     world, things = _of_type(values, "world", dict), _of_type(values, "thing_names", dict) or {}
     ours = {
         *known, "atom_names", "atom_denials", "silent_atoms", "lone_atoms", "edits", "camera_path", "tour",
-        "world", "thing_names", "shift", _VERSION_1, *_COST,
+        "world", "thing_names", "shift", "antialiased", _VERSION_1, *_COST,
     }  # fmt: skip
     return Record(
         **{name: value for name, value in known.items() if value is not None},
@@ -71,6 +72,7 @@ def from_json(values: dict) -> Record:
         thing_names={str(thing): str(name) for thing, name in things.items()},
         camera_path=tuple(_list(values, "camera_path", dict)),
         tour=told_tour(read_tour(_of_type(values, "tour", dict) or {})),
+        antialiased=_flag(values, "antialiased"),
         num_deleted=int(_of_type(edits, "deleted", int) or 0),
         cost=Cost(
             timings=_of_type(values, "timings", dict) or {},
@@ -103,6 +105,13 @@ def _of_type(values: dict, name: str, *types: type):
         return value
     expected = " or ".join(kind.__name__ for kind in types)
     raise ValueError(f"{name}: expected {expected}, received {value!r}")
+
+
+def _flag(values: dict, name: str) -> bool:
+    value = values.get(name, False)
+    if isinstance(value, bool):
+        return value
+    raise ValueError(f"{name}: expected true or false, received {value!r}")
 
 
 def _list(values: dict, name: str, kind: type) -> list:

@@ -28,7 +28,7 @@ def run(args: Namespace, out: TextIO) -> None:
     prepared(request)
     for path in (args.scene, *args.beside):
         readable_file(path, "scene", SceneFileError)
-    scene = open_scene(args.scene)
+    scene = open_scene(args.scene, request.axes_of(args.scene))
     say_hints(scene, request.prompts)
     with ProgressBar() as progress:
         said = write(scene, request, renderers=partial(open_renderer, args.backend), progress=progress)

@@ -8,7 +8,7 @@ from langflash_core.errors import ImageError, InputError, WeightsError
 from langflash_core.files import check_output_file, readable_file
 
 from ..renderers import open_renderer
-from ..report import ProgressBar, write_json
+from ..report import ProgressBar, say_warnings, write_json
 from ..scenes import open_scene
 
 SUFFIXES = (".langflash", ".ply", ".glb")
@@ -28,7 +28,7 @@ def run(args: Namespace, out: TextIO) -> None:
     if args.weights is not None:
         readable_file(args.weights, "checkpoint", WeightsError)
     check_output_file(args.output, SUFFIXES, inputs=[args.scene, *(args.photos or ())])
-    scene = open_scene(args.scene)
+    scene = open_scene(args.scene, args.axes)
     from langflash_core.export import export
     from langflash_core.files import make_folder
     from langflash_core.lift import lift, posed_views
@@ -48,6 +48,7 @@ def run(args: Namespace, out: TextIO) -> None:
         )
         make_folder(args.output.parent)
         export(lifted, args.output)
+    say_warnings(lifted.record.warnings[len(scene.record.warnings) :])
     document = {
         "scene": str(args.output),
         "gaussians": len(lifted.gaussians),

@@ -34,7 +34,7 @@ def run(args: Namespace, out: TextIO) -> None:
     readable_file(args.scene, "scene", SceneFileError)
     check_output_file(args.output, (".png",), inputs=[args.scene])
 
-    scene = open_scene(args.scene)
+    scene = open_scene(args.scene, args.axes)
     say_hints(scene, prompts)
     _check_atom(picture, atom, scene)
     camera, colours = choice.of(scene), HeatColours(args.colormap, args.span)

@@ -22,6 +22,7 @@ from ..values import (
     whole_count,
 )
 from .shared import (
+    add_axes,
     add_backend,
     add_camera,
     add_colours,
@@ -252,6 +253,7 @@ def add_render(commands) -> None:
     )
     add_shown(command)
     add_colours(command)
+    add_axes(command)
     add_backend(command)
     add_json(command)
 
@@ -330,6 +332,7 @@ def add_export(commands) -> None:
     )
     add_camera(command)
     add_shown(command)
+    add_axes(command, written=True)
     add_backend(command)
 
 
@@ -358,6 +361,7 @@ def add_lift(commands) -> None:
     command.add_argument(
         "--weights", type=Path, metavar="PATH", help="a checkpoint instead of the shipped ones"
     )
+    add_axes(command)
     add_backend(command)
     add_json(command)
 
@@ -447,6 +451,7 @@ def add_clean(commands) -> None:
     command.add_argument("--save-recipe", type=Path, metavar="FILE", help="a .json, for other scenes")
     command.add_argument("--fill", action="store_true", help="fill what was removed from what is around it")
     command.add_argument("--preview", type=Path, metavar="IMG", help="a .png: what goes, in red, and after")
+    add_axes(command)
     add_backend(command)
     add_json(command)
 
@@ -473,6 +478,7 @@ def add_level(commands) -> None:
     )
     lengths.add_argument("--ceiling", type=above_zero, metavar="METRES", help="the ceiling is so high")
     lengths.add_argument("--door", type=above_zero, metavar="METRES", help="the door is so high")
+    add_axes(command)
     add_json(command)
 
 
@@ -519,6 +525,7 @@ def add_info(commands) -> None:
     command.add_argument(
         "--limits", action="store_true", help="how much readers take of a file, and the variables that say so"
     )
+    add_axes(command)
     add_json(command)
 
 
