@@ -114,9 +114,11 @@ def posed_views(poses: Path, photos: Sequence[Path]) -> tuple[Views, Tensor]:
     """
     posed = read_posed(poses).of(photos)
     step = 1 if photos else -(-len(posed.paths) // VIEWS)
-    posed = posed.of(posed.paths[::step])
+    posed = posed.at(range(0, len(posed.paths), step)).upright()
     preset = PRESETS[PRESET]
-    views = load_views(posed.paths, area=preset.native_area, multiple=preset.patch, **posed.lens())
+    views = load_views(
+        posed.paths, area=preset.native_area, multiple=preset.patch, intrinsics=posed.intrinsics
+    )
     return views, posed.viewmats.float()
 
 

@@ -8,6 +8,7 @@ whatever happens to it is an `OSError` here. Of pictures that move, the first is
 import ctypes
 import io
 import logging
+import struct
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -25,6 +26,9 @@ FORMATS = ("JPEG", "MPO", "PNG", "WEBP", "TIFF", "HEIF", "AVIF", "JPEG2000", "BM
 STORED = ("JPEG", "PNG", "WEBP")
 """Of pictures inside scenes and other files of ours."""
 _APART = frozenset(("HEIF", "AVIF"))
+_ORIENTATION = 0x0112
+_BROKEN_EXIF = (OSError, SyntaxError, ValueError, TypeError, LookupError, ArithmeticError, AttributeError,
+                RuntimeError, struct.error)  # fmt: skip
 
 
 class TooManyPixels(OSError):
@@ -65,6 +69,19 @@ def picture_block(picture: Image.Image, name: str) -> bytes | None:
     """A block of a picture's file, "icc_profile" or "exif"; None where there is none, or one too long."""
     block = picture.info.get(name)
     return block if isinstance(block, bytes) and block and not PROFILE.passed_by(len(block)) else None
+
+
+def stored_shape(picture: Image.Image) -> tuple[tuple[int, int], int]:
+    """(width, height) of the pixels as they are stored, and EXIF's orientation of them, 1 to 8; of a picture
+    that was opened and not yet decoded. A broken block, or one that is too long, counts as none."""
+    try:
+        known = {} if PROFILE.passed_by(len(picture.info.get("exif") or b"")) else picture.getexif()
+        orientation = int(known.get(_ORIENTATION, 1))
+    except _BROKEN_EXIF:
+        orientation = 1
+    orientation = orientation if 1 <= orientation <= 8 else 1
+    told_upright = picture.format == "TIFF" and orientation >= 5  # Pillow turns these by itself
+    return picture.size[::-1] if told_upright else picture.size, orientation
 
 
 def _identified(stream: BufferedIOBase, formats: tuple[str, ...], start: bytes) -> Image.Image:

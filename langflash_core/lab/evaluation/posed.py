@@ -13,12 +13,14 @@ import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from typing import cast
 
 import torch
 from PIL import Image
 from torch import Tensor
 
 from langflash_core.errors import InputError
+from langflash_core.images.lens import Intrinsics
 from langflash_core.images.pictures import centre_box
 from langflash_core.lab.evaluation.alignment import aligned_camera
 from langflash_core.lab.evaluation.labelled import Render
@@ -175,7 +177,12 @@ def judge_triple(
     first, between, second = (folder.photo(id) for id in (triple.first, triple.between, triple.second))
     to_second, to_between = relative(first, second), relative(first, between)
     scene, seconds = scene_of(
-        (first, second), first.intrinsics, weights=weights, preset=preset, size=size, networks=networks
+        (first, second),
+        lenses_of((first, second)),
+        weights=weights,
+        preset=preset,
+        size=size,
+        networks=networks,
     )
     placed = scene.num_views == 2
     predicted = scene.viewmats[1].cpu() if placed else torch.eye(4)
@@ -243,7 +250,7 @@ def relative(first: LabelledPhoto, other: LabelledPhoto) -> Tensor:
 
 def scene_of(
     photos: Sequence[LabelledPhoto],
-    intrinsics: tuple[float, float, float, float] | None,
+    intrinsics: Intrinsics | Sequence[Intrinsics] | None,
     *,
     weights: Path | None = None,
     preset: str = "mini",
@@ -261,6 +268,12 @@ def scene_of(
             paths, preset=preset, weights=weights, intrinsics=intrinsics, size=size, networks=networks
         )
         return scene, time.perf_counter() - start
+
+
+def lenses_of(photos: Sequence[LabelledPhoto]) -> tuple[Intrinsics, ...] | None:
+    """The lens of each photo; None: of one of them it is not known."""
+    lenses = tuple(photo.intrinsics for photo in photos)
+    return None if None in lenses else cast(tuple[Intrinsics, ...], lenses)
 
 
 def as_seen(photo: LabelledPhoto, size: tuple[int, int]) -> FittedPhoto:
