@@ -8,7 +8,7 @@ from langflash_core.errors import ImageError, InputError, WeightsError
 from langflash_core.files import check_output_file, readable_file
 
 from ..renderers import open_renderer
-from ..report import ProgressBar, write_json
+from ..report import ProgressBar, say_warnings, write_json
 from ..scenes import open_scene
 
 SUFFIXES = (".langflash", ".ply", ".glb")
@@ -46,6 +46,7 @@ def run(args: Namespace, out: TextIO) -> None:
         )
         make_folder(args.output.parent)
         export(lifted, args.output)
+    say_warnings(note for note in lifted.record.warnings if note not in scene.record.warnings)
     document = {
         "scene": str(args.output),
         "gaussians": len(lifted.gaussians),
