@@ -116,7 +116,7 @@ def posed_views(poses: Path, photos: Sequence[Path]) -> tuple[Views, Tensor]:
     """Photos as the network sees them, and their poses (V, 4, 4) in their own world.
 
     Args:
-        poses: a transforms.json, or a COLMAP text model. photos: those to take; none: all, at most 8,
+        poses: a transforms.json, or a COLMAP model. photos: those to take; none: all, at most 8,
             evenly chosen.
 
     Raises:

@@ -13,7 +13,6 @@ import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import cast
 
 import torch
 from PIL import Image
@@ -32,6 +31,7 @@ from langflash_core.lab.evaluation.sights import Look, Sight, error_picture, pho
 from langflash_core.lab.evaluation.tallies import Shelf, collected, merged
 from langflash_core.lab.photos import LabelledPhoto, PhotoFolder
 from langflash_core.lab.photos.fitting import FittedPhoto, fitted
+from langflash_core.lab.photos.folder import lenses_of
 from langflash_core.lab.training.losses import ssim_map
 from langflash_core.lab.training.measures import abs_rel, align_scale, delta1, nan_mean, psnr
 from langflash_core.language.answers import COVERED_ALPHA
@@ -268,12 +268,6 @@ def scene_of(
             paths, preset=preset, weights=weights, intrinsics=intrinsics, size=size, networks=networks
         )
         return scene, time.perf_counter() - start
-
-
-def lenses_of(photos: Sequence[LabelledPhoto]) -> tuple[Intrinsics, ...] | None:
-    """The lens of each photo; None: of one of them it is not known."""
-    lenses = tuple(photo.intrinsics for photo in photos)
-    return None if None in lenses else cast(tuple[Intrinsics, ...], lenses)
 
 
 def as_seen(photo: LabelledPhoto, size: tuple[int, int]) -> FittedPhoto:

@@ -31,6 +31,7 @@ from torch import Tensor
 from langflash_core.errors import InputError
 from langflash_core.geometry.cameras import MIRRORED, invert_rigid, turned_camera
 from langflash_core.images.decode import read_photo
+from langflash_core.images.lens import Intrinsics
 from langflash_core.lab.photos.names import CLASSES40, class_of, spoken
 from langflash_core.picture_files import opened_picture, stored_shape
 
@@ -71,6 +72,13 @@ class LabelledPhoto:
         if self.K is None:
             return None
         return float(self.K[0, 0]), float(self.K[1, 1]), float(self.K[0, 2]), float(self.K[1, 2])
+
+
+def lenses_of(photos: Sequence[LabelledPhoto]) -> tuple[Intrinsics, ...] | None:
+    """(fx, fy, cx, cy) of each photo, pixels; None: of one of them they are not known."""
+    lenses = [photo.intrinsics for photo in photos]
+    known = tuple(lens for lens in lenses if lens is not None)
+    return known if len(known) == len(lenses) else None
 
 
 @dataclass(frozen=True)
