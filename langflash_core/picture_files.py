@@ -81,7 +81,8 @@ def stored_shape(picture: Image.Image) -> tuple[tuple[int, int], int]:
         orientation = 1
     orientation = orientation if 1 <= orientation <= 8 else 1
     told_upright = picture.format == "TIFF" and orientation >= 5  # Pillow turns these by itself
-    return picture.size[::-1] if told_upright else picture.size, orientation
+    width, height = picture.size
+    return (height, width) if told_upright else (width, height), orientation
 
 
 def _identified(stream: BufferedIOBase, formats: tuple[str, ...], start: bytes) -> Image.Image:

@@ -107,12 +107,13 @@ class PosedPhotos:
         """
         found = []
         for path, K, viewmat, said in zip(self.paths, self.Ks, self.viewmats, self.sizes, strict=True):
-            size, orientation = _shape(path)
-            if not _same_shape(size, said) and orientation >= 5 and _same_shape(size[::-1], said):
-                size, orientation = size[::-1], 1  # poses of the upright photo
+            (width, height), orientation = _shape(path)
+            size = width, height
+            if not _same_shape(size, said) and orientation >= 5 and _same_shape((height, width), said):
+                size, orientation = (height, width), 1  # poses of the upright photo
             if not _same_shape(size, said):
                 raise SceneFileError(
-                    f"{path.name} is {size[0]} x {size[1]} pixels, its pose is of {said[0]} x {said[1]}; "
+                    f"{path.name} is {width} x {height} pixels, its pose is of {said[0]} x {said[1]}; "
                     "give the photos that the poses were found from, at any size"
                 )
             if orientation in MIRRORED:

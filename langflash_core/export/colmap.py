@@ -236,6 +236,6 @@ def _of_binary(folder: Path) -> list[Seen]:
     for _ in range(images.count(smallest=64 + 1 + 8)):
         numbers, name = images.take("I7dI"), images.text()
         seen.append(Seen(name, _viewmat(numbers[1:8]), lenses[numbers[8]]))
-        images.skip(*images.take("Q"), 24)
+        images.skip(images.take("Q")[0], 24)
     images.check_end()
     return seen

@@ -128,7 +128,8 @@ def turned_camera(
     camera[:2, :2] = turn
     upright = to_upright @ K
     upright[:, :2] = upright[:, :2] @ turn.T
-    return upright, camera @ viewmat, size[::-1] if orientation >= 5 else size
+    width, height = size
+    return upright, camera @ viewmat, (height, width) if orientation >= 5 else (width, height)
 
 
 def rotation_angle_degrees(
