@@ -29,7 +29,9 @@ _APART = frozenset(("HEIF", "AVIF"))
 _BRANDS = frozenset(  # of files that begin as films do, too
     (b"heic", b"heix", b"heim", b"heis", b"hevc", b"hevx", b"mif1", b"msf1", b"avif", b"avis")
 )
-_DAMAGE = (OSError, SyntaxError, ValueError, TypeError, LookupError, ArithmeticError, struct.error)
+_ORIENTATION = 0x0112
+_DAMAGE = (OSError, SyntaxError, ValueError, TypeError, LookupError, ArithmeticError, AttributeError,
+           RuntimeError, struct.error)  # fmt: skip
 
 
 class TooManyPixels(OSError):
@@ -83,6 +85,20 @@ def picture_block(picture: Image.Image, name: str) -> bytes | None:
     """A block of a picture's file, "icc_profile" or "exif"; None where there is none, or one too long."""
     block = picture.info.get(name)
     return block if isinstance(block, bytes) and block and not PROFILE.passed_by(len(block)) else None
+
+
+def stored_shape(picture: Image.Image) -> tuple[tuple[int, int], int]:
+    """(width, height) of the pixels as they are stored, and EXIF's orientation of them, 1 to 8; of a picture
+    that was opened and not yet decoded. A broken block, or one that is too long, counts as none."""
+    try:
+        known = {} if PROFILE.passed_by(len(picture.info.get("exif") or b"")) else picture.getexif()
+        orientation = int(known.get(_ORIENTATION, 1))
+    except _DAMAGE:
+        orientation = 1
+    orientation = orientation if 1 <= orientation <= 8 else 1
+    told_upright = picture.format == "TIFF" and orientation >= 5  # Pillow turns these by itself
+    width, height = picture.size
+    return (height, width) if told_upright else (width, height), orientation
 
 
 def _identified(stream: BufferedIOBase, formats: tuple[str, ...], start: bytes) -> Image.Image:

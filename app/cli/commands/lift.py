@@ -22,7 +22,7 @@ def run(args: Namespace, out: TextIO) -> None:
     """
     start = time.perf_counter()
     if args.photos and not args.poses:
-        raise InputError("photos need --poses, a transforms.json or a COLMAP text model in the scene's world")
+        raise InputError("photos need --poses, a transforms.json or a COLMAP model in the scene's world")
     for photo in args.photos or ():
         readable_file(photo, "photo", ImageError)
     if args.weights is not None:

@@ -89,8 +89,8 @@ def _written(args: Namespace, films: Sequence[dict[str, Any]]) -> "Scene":
 
     lens, viewmats = {"fov": args.fov, "intrinsics": args.intrinsics}, None
     if args.poses:
-        posed = read_posed(args.poses).of(args.photos)
-        lens, viewmats = posed.lens(), posed.viewmats
+        posed = read_posed(args.poses).of(args.photos).upright()
+        lens, viewmats = {"intrinsics": posed.intrinsics}, posed.viewmats
     with ProgressBar() as progress:
         said = list[str]()
 

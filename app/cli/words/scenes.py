@@ -103,7 +103,7 @@ def add_reconstruct(commands) -> None:
         "--poses",
         type=Path,
         metavar="PATH",
-        help="a transforms.json or COLMAP text model with the photos' poses and lenses: they are not sought, "
+        help="a transforms.json or COLMAP model with the photos' poses and lenses: they are not sought, "
         "and the scene is in their world and unit",
     )
     command.add_argument(
@@ -350,7 +350,7 @@ def add_lift(commands) -> None:
         metavar="PHOTO",
         help="of the place, with --poses; else views of itself",
     )
-    command.add_argument("--poses", type=Path, metavar="PATH", help="transforms.json, or a COLMAP text model")
+    command.add_argument("--poses", type=Path, metavar="PATH", help="transforms.json, or a COLMAP model")
     command.add_argument(
         "--up",
         choices=("x", "y", "z", "-x", "-y", "-z"),
