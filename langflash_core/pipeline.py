@@ -84,7 +84,8 @@ def reconstruct(
             sought, and the scene is in that world; preset mini. None: the first photo's camera is the world.
         device: "auto" takes CUDA where there is one; "cpu"; "cuda".
         keep: a folder for what is done of it: matches, each photo's depth, what the network found. The same
-            photos and settings go on from there, to the same bits. `keeping.forget` clears it. None: nowhere.
+            photos and settings go on from there, on the same machine with as many threads to the same bits.
+            `keeping.forget` clears it. None: nowhere.
         progress: called with the stage and the fraction of the whole in [0, 1].
         cancelled: asked between stages, photos and pairs of photos, and before every layer.
         ahead: of `ahead.begin` with the same arguments, which may have been called before torch was
