@@ -1,7 +1,7 @@
 """Steps that do not wait for each other, such as those of single photos, on as many threads as torch has.
 
 What is done for a photo by numpy and scipy takes one thread each. Every step computes alone, so what comes
-out has the same bits as one after the other with one thread.
+out has, on one machine, the same bits as one after the other with one thread.
 """
 
 from collections import deque

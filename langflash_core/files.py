@@ -2,13 +2,16 @@
 checked of them before the work.
 
 The hidden one beside it is called `.NAME.HOST-PROCESS-RANDOM.part`. A killed process leaves its own
-behind; the next write into the folder from the same computer sweeps it up.
+behind; the next write into the folder from the same computer sweeps it up. A symbolic link stays: the place
+of a file is the one that it leads to.
 """
 
+import errno
 import json
 import os
 import re
 import shutil
+import stat
 import sys
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager, suppress
@@ -26,22 +29,23 @@ def write_atomically(path: Path, content: bytes | Iterable[bytes]) -> None:
     """Write `content`, whole or in parts, to `path`; whatever stops it, the old file or none is there.
 
     Raises:
-        OutputError: the folder is missing, is a file, or cannot be written.
+        OutputError: the folder is missing, is a file, or cannot be written; see `place_of`.
     """
-    folder = path.parent
     if os.path.isdir(path):  # unlike Path, without an error for a name that is too long
         raise OutputError(f"cannot write {path}: it is a folder; name a file in it")
+    place = place_of(path)
+    folder = place.parent
     if not os.path.isdir(folder):
         state = "is a file" if os.path.exists(folder) else "does not exist"
         raise OutputError(f"cannot write {path}: {folder} {state}; create that folder first")
-    temporary = part_beside(path)
+    temporary = part_beside(place)
     with _cleared(path, temporary):
         with temporary.open("xb") as stream:
             for part in (content,) if isinstance(content, bytes) else content:
                 stream.write(part)
             stream.flush()
             os.fsync(stream.fileno())
-        os.replace(temporary, path)
+        os.replace(temporary, place)
 
 
 @contextmanager
@@ -52,13 +56,14 @@ def written_atomically(path: Path, library: type[Exception] = OSError) -> Iterat
         library: what is raised by one that writes by itself where the system refuses.
 
     Raises:
-        OutputError: the folder cannot be made or written, or the disk is full.
+        OutputError: the folder cannot be made or written, or the disk is full; see `place_of`.
     """
-    make_folder(path.parent)
-    temporary = part_beside(path)
+    place = place_of(path)
+    make_folder(place.parent)
+    temporary = part_beside(place)
     with _cleared(path, temporary, library=library):
         yield temporary
-        os.replace(temporary, path)
+        os.replace(temporary, place)
 
 
 @contextmanager
@@ -68,9 +73,10 @@ def filled_atomically(folder: Path) -> Iterator[Path]:
     Raises:
         OutputError: the folder cannot be made or written, a file is in its place, or the disk is full.
     """
+    folder = _end_of_links(folder)
     make_folder(folder.parent)
     temporary, old = part_beside(folder), part_beside(folder)
-    if os.path.isfile(folder):
+    if os.path.exists(folder) and not os.path.isdir(folder):
         raise OutputError(f"cannot write {folder}: a file of that name is in the way; choose another place")
     with _cleared(folder, temporary, old):
         temporary.mkdir()
@@ -78,6 +84,51 @@ def filled_atomically(folder: Path) -> Iterator[Path]:
         if os.path.isdir(folder):
             os.replace(folder, old)
         os.replace(temporary, folder)
+
+
+def place_of(path: Path) -> Path:
+    """Where a file called so is written: `path`, or what the symbolic link there leads to, which need not be
+    there yet.
+
+    Raises:
+        OutputError: links lead in a circle, or into a folder that is not there; what is there is no plain
+            file (a device, a pipe), or is read-only: moving a file onto it would do away with it all the
+            same.
+    """
+    place = _end_of_links(path)
+    if place != path and not os.path.isdir(place.parent):
+        leads = f"it is a symbolic link to {place}, and that folder does not exist"
+        raise OutputError(f"cannot write {path}: {leads}; create it, or choose another place")
+    try:
+        mode = os.stat(place).st_mode
+    except (OSError, ValueError):  # nothing is there, or no disk takes such a name: writing says so
+        return place
+    if not stat.S_ISREG(mode) and not stat.S_ISDIR(mode):
+        raise OutputError(
+            f"cannot write {path}: {_itself(place, path)} is no plain file; choose another place"
+        )
+    if not mode & 0o222 or not os.access(place, os.W_OK):  # root may write all files
+        remedy = "make it writable, or choose another place"
+        raise OutputError(f"cannot write {path}: {_itself(place, path)} is read-only; {remedy}")
+    return place
+
+
+def _end_of_links(path: Path) -> Path:
+    """What the symbolic link `path` leads to in the end; any other path as it is.
+
+    Raises:
+        OutputError: it leads in a circle.
+    """
+    if not os.path.islink(path):
+        return path
+    place = Path(os.path.realpath(path))
+    if os.path.islink(place):
+        raise OutputError(f"cannot write {path}: its symbolic links lead in a circle; choose another place")
+    return place
+
+
+def _itself(place: Path, path: Path) -> str:
+    return "it" if place == path else f"{place}, to which it is a symbolic link,"
 
 
 @contextmanager
@@ -122,7 +173,7 @@ def make_folder(folder: Path) -> None:
         OutputError: something in the way is a file, or cannot be written.
     """
     try:
-        folder.mkdir(parents=True, exist_ok=True)
+        _end_of_links(folder).mkdir(parents=True, exist_ok=True)
     except OSError as error:
         reason = "a file of that name is in the way" if isinstance(error, FileExistsError) else error.strerror
         raise OutputError(f"cannot create the folder {folder}: {reason}; choose another place") from error
@@ -261,16 +312,17 @@ def check_output_file(
         option: that named it.
 
     Raises:
-        OutputError: wrong ending, a folder, an input of the same command, or not writable.
+        OutputError: wrong ending, a folder, an input of the same command, or not writable; see `place_of`.
     """
     if path.is_dir():
         raise OutputError(f"cannot write {path}: it is a folder; give a file name")
+    place = place_of(path)
     if any(path.exists() and other.exists() and path.samefile(other) for other in inputs):
         raise OutputError(f"{path} is also an input; choose another {option}")
     if suffixes and kind_of(path) not in suffixes:
         wanted = f"this command writes {', '.join(suffixes)}"
         raise OutputError(f"cannot write {path.name}: {wanted}; rename {option}")
-    check_folder(path.parent, option)
+    check_folder(place.parent, option)
     return path
 
 
@@ -338,23 +390,24 @@ def staged_folder(folder: Path) -> Iterator[Path]:
 
 
 def move_all(moves: dict[Path, Path]) -> None:
-    """Move files (keys) to new places (values) on the same disk; what stops it is undone.
+    """Move files (keys) to new places (values); what stops it is undone.
 
     Only a file that was overwritten before the failure is not brought back.
 
     Raises:
-        OutputError: a folder is in the way, or may not be written.
+        OutputError: a folder is in the way, or may not be written; see `place_of`.
     """
     for target in moves.values():
         if target.is_dir():
             raise OutputError(f"cannot write {target}: it is a folder; choose another -o")
+    places = {source: place_of(target) for source, target in moves.items()}
     undo: list[Callable[[], None]] = []
     try:
-        for source, target in moves.items():
-            _make_folder(target.parent, undo)
-            if not target.exists():
-                undo.append(lambda target=target: target.unlink(missing_ok=True))
-            os.replace(source, target)
+        for source, place in places.items():
+            _make_folder(place.parent, undo)
+            if not place.exists():
+                undo.append(lambda place=place: place.unlink(missing_ok=True))
+            _move(source, place)
     except BaseException as problem:
         for step in reversed(undo):
             with suppress(OSError):
@@ -365,8 +418,24 @@ def move_all(moves: dict[Path, Path]) -> None:
         raise
 
 
+def _move(source: Path, place: Path) -> None:
+    """Also onto another disk, where a symbolic link may lead: then through a copy beside the place."""
+    try:
+        os.replace(source, place)
+    except OSError as problem:
+        if problem.errno != errno.EXDEV:
+            raise
+        copy = part_beside(place)
+        try:
+            shutil.copyfile(source, copy)
+            os.replace(copy, place)
+        finally:
+            _remove(copy)
+
+
 def _make_folder(folder: Path, undo: list[Callable[[], None]]) -> None:
     """Make `folder` and its parents; `undo` learns how to take the new ones away."""
+    folder = _end_of_links(folder)
     if folder.is_dir():
         return
     _make_folder(folder.parent, undo)
@@ -375,8 +444,8 @@ def _make_folder(folder: Path, undo: list[Callable[[], None]]) -> None:
 
 
 def _nearest(folder: Path) -> Path:
-    """`folder`, or the nearest parent that exists."""
+    """`folder`, or the nearest parent that exists, of what a symbolic link on the way leads to."""
     nearest = folder.absolute()
     while not nearest.exists() and nearest != nearest.parent:
-        nearest = nearest.parent
+        nearest = _end_of_links(nearest) if nearest.is_symlink() else nearest.parent
     return nearest

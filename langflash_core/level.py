@@ -21,7 +21,6 @@ from jaxtyping import Bool, Float, UInt8
 
 from langflash_core.errors import InputError, LangFlashError
 from langflash_core.geometry.manhattan import Directions, Sights, found_directions
-from langflash_core.geometry.quaternions import quats_to_matrices
 from langflash_core.images.lines import line_segments
 from langflash_core.language.answers import world_points
 from langflash_core.language.gaussians import gaussian_relevance
@@ -29,15 +28,15 @@ from langflash_core.language.relevance import compile_query
 from langflash_core.language.spaces import language_space
 from langflash_core.picture_files import STORED, opened_picture
 from langflash_core.records import Guess, World
+from langflash_core.scene.standing import normals_of
 from langflash_core.scene.thin import covered_areas
 from langflash_core.scene.world import placed, turn_of
 from langflash_core.splat import render
-from langflash_core.types import NO_LANGUAGE, Camera, Gaussians, Scene
+from langflash_core.types import NO_LANGUAGE, Camera, Scene
 
 SAMPLES = 6000
 """Points of the surface that are looked at."""
 _WORDS = ("floor", "rug", "ceiling", "door")
-_FLAT = 0.5  # of a Gaussian's second axis, at most its third: it has a normal
 _SHARE = 0.02  # of the surface, from which what answers a word is believed in
 _LEVEL = math.cos(math.radians(30))  # of a surface that may be a floor or a ceiling
 _WINDOW = 0.04  # of the scene's height: surfaces so near in height are one
@@ -183,8 +182,37 @@ def upright(scene: Scene) -> Scene:
     return moved.with_record(world=stands, metric_scale=known, network_unit=unit)
 
 
+def on_its_head(scene: Scene, up: Float[np.ndarray, "3"]) -> bool:
+    """Whether what is called floor lies above what is called ceiling, up being a unit vector of the scene's
+    axes; no, where it does not show both."""
+    try:
+        some = _surface_rows(scene)
+    except InputError:  # nothing stands there
+        return False
+    answers, threshold = _relevance(some)
+    floor, ceiling = answers[:, _WORDS.index("floor")], answers[:, _WORDS.index("ceiling")]
+    below, above = (
+        (one >= threshold) & (one > other) for one, other in ((floor, ceiling), (ceiling, floor))
+    )  # either word may find both
+    if below.mean() < _SHARE or above.mean() < _SHARE:
+        return False
+    heights = some.gaussians.means.double().numpy() @ up
+    return bool(np.median(heights[below]) > np.median(heights[above]))
+
+
 def surface_of(scene: Scene) -> Surface:
     """`SAMPLES` points of the surface; the same scene gives the same ones.
+
+    Raises:
+        InputError: there is no surface.
+    """
+    some = _surface_rows(scene)
+    answers, threshold = _relevance(some)
+    return Surface(some.gaussians.means.double().numpy(), normals_of(some.gaussians), answers >= threshold)
+
+
+def _surface_rows(scene: Scene) -> Scene:
+    """Those that show `SAMPLES` points of the surface.
 
     Raises:
         InputError: there is no surface.
@@ -196,29 +224,20 @@ def surface_of(scene: Scene) -> Surface:
         raise InputError("this scene holds no surface; make it again, or undo what deleted it")
     places = (np.arange(SAMPLES) + 0.5) / SAMPLES * total
     rows = np.searchsorted(np.cumsum(areas), places).clip(max=len(areas) - 1)
-    some = scene.rows(torch.from_numpy(rows))
-    return Surface(some.gaussians.means.double().numpy(), normals_of(some.gaussians), _answers(some))
+    return scene.rows(torch.from_numpy(rows))
 
 
-def normals_of(gaussians: Gaussians) -> Float[np.ndarray, "N 3"]:
-    """The shortest axis of each Gaussian; 0 of those that are not flat."""
-    scales = gaussians.scales.double().numpy()
-    ordered = np.sort(scales, 1)
-    axes = quats_to_matrices(gaussians.quats.double()).numpy()
-    normals = np.take_along_axis(axes, scales.argmin(1)[:, None, None], 2)[:, :, 0]
-    flat = ordered[:, 0] <= _FLAT * ordered[:, 1]
-    return np.where(flat[:, None], np.nan_to_num(normals), 0.0)
-
-
-def _answers(some: Scene) -> np.ndarray:
-    """(n, 4) of `_WORDS`; nothing where the scene has no language, or no weights for it."""
+def _relevance(some: Scene) -> tuple[np.ndarray, float]:
+    """(n, 4) of `_WORDS`, and from which on it is an answer; none where the scene has no language, or no
+    weights for it."""
+    nothing = np.zeros((len(some.gaussians), len(_WORDS)), np.float32), 1.0
     if some.semantics.space == NO_LANGUAGE or not some.semantics.num_atoms:
-        return np.zeros((len(some.gaussians), len(_WORDS)), bool)
+        return nothing
     try:
         compiled = compile_query(some, language_space(some.semantics.space), list(_WORDS))
     except LangFlashError:  # surfaces and photos tell it without words
-        return np.zeros((len(some.gaussians), len(_WORDS)), bool)
-    return (gaussian_relevance(some.semantics, compiled) >= compiled.threshold).T.numpy()
+        return nothing
+    return gaussian_relevance(some.semantics, compiled).T.numpy(), compiled.threshold
 
 
 def _sights(scene: Scene, surface: Surface) -> Sights:

@@ -14,6 +14,7 @@ from pathlib import Path
 
 import numpy as np
 import torch
+from jaxtyping import Float
 from PIL import Image
 from scipy.spatial import KDTree
 from torch import Tensor
@@ -24,8 +25,10 @@ from langflash_core.geometry.cameras import invert_rigid
 from langflash_core.geometry.turning import axes_matrix
 from langflash_core.images.pictures import fitting_size
 from langflash_core.images.views import load_views
+from langflash_core.level import on_its_head
 from langflash_core.network import PRESETS, load_network
 from langflash_core.network.posed import posed_semantics
+from langflash_core.records import Shift
 from langflash_core.scene.assemble import sparse_weights
 from langflash_core.scene.bare import framing_camera
 from langflash_core.splat import render as render_reference
@@ -38,6 +41,13 @@ _CLOSER = 0.85  # of the framing camera's distance: things fill more of each vie
 _ELEVATIONS = (15.0, 35.0)  # degrees above the horizon, in turn
 _GREY = 0.5  # behind what a view shows, as behind transparent photos
 _COVERED = 0.5  # alpha from which a pixel speaks of the scene
+_BLUR = 5  # pixels, odd
+_FEWEST_SHOWN = 0.02  # of a view, to be compared with its photo
+_FLAT = 0.002  # change of brightness from pixel to pixel, of 1: a wall
+_ALIKE = 0.3
+"""Likeness below which a photo's pose is in doubt: of right ones it is .86 and more where the scene was made
+of neighbours, of others within .2 of 0."""
+_SPARED = 0.25  # of the photos may be less alike: somebody walks through them
 _SEEN = 1e-3  # sum of c_ip below which a Gaussian counts as not seen
 _TOP = 8  # weights kept per Gaussian
 UP = "-y"  # of the world of a `Scene`
@@ -99,25 +109,47 @@ def lift(
         raise InputError("the network finds no part in these views; give photos that show more of the scene")
     sums, totals = _carried_back(scene, cameras, maps, frames, progress, cancelled)
     progress("done", 1.0)
-    return _spoken(scene, views, cameras, sums, totals, dictionary, network.calibration)
+    lifted = _spoken(scene, views, cameras, sums, totals, dictionary, network.calibration)
+    if photos is None:
+        return _with_hint(lifted, up)
+    doubt = _doubt(frames, views)
+    return lifted.with_record(warnings=(*lifted.record.warnings, doubt)) if doubt else lifted
 
 
-def posed_views(poses: Path, photos: Sequence[Path]) -> tuple[Views, Tensor]:
+def _with_hint(lifted: Scene, up: str) -> Scene:
+    """With a warning, where by its own words it stands on its head."""
+    if not on_its_head(lifted, -axes_matrix(_TO_DOWN[up])[1].numpy()):
+        return lifted
+    other = up[1:] if up.startswith("-") else f"-{up}"
+    hint = (
+        "What is called floor lies above what is called ceiling, so the scene seems to stand on its head; "
+        f"lift it again with --up={other}, or a .spz of SuperSplat with --axes rdf."
+    )
+    return lifted.with_record(warnings=(*lifted.record.warnings, hint))
+
+
+def posed_views(poses: Path, photos: Sequence[Path], shift: Shift | None = None) -> tuple[Views, Tensor]:
     """Photos as the network sees them, and their poses (V, 4, 4) in their own world.
 
     Args:
-        poses: a transforms.json, or a COLMAP text model. photos: those to take; none: all, at most 8,
-            evenly chosen.
+        poses: a transforms.json, or a COLMAP model. photos: those to take; none: all, at most 8, evenly
+            chosen. shift: what was taken off the scene's coordinates, as its record has it; it is taken off
+            the poses, too.
 
     Raises:
         SceneFileError: the poses cannot be used. ImageError: a photo cannot.
     """
     posed = read_posed(poses).of(photos)
     step = 1 if photos else -(-len(posed.paths) // VIEWS)
-    posed = posed.of(posed.paths[::step])
+    posed = posed.at(range(0, len(posed.paths), step)).upright()
     preset = PRESETS[PRESET]
-    views = load_views(posed.paths, area=preset.native_area, multiple=preset.patch, **posed.lens())
-    return views, posed.viewmats.float()
+    views = load_views(
+        posed.paths, area=preset.native_area, multiple=preset.patch, intrinsics=posed.intrinsics
+    )
+    viewmats = posed.viewmats.clone()
+    if shift is not None:
+        viewmats[:, :3, 3] += viewmats[:, :3, :3] @ torch.tensor(shift, dtype=viewmats.dtype)
+    return views, viewmats.float()
 
 
 def cameras_around(scene: Scene, count: int = VIEWS, up: str = UP) -> list[Camera]:
@@ -203,6 +235,50 @@ def _check_shown(frames: Sequence[Frame]) -> None:
         raise InputError(
             "the views show almost nothing of the scene; check that the poses are in its world and its unit"
         )
+
+
+def likeness(frame: Frame, photo: Float[Tensor, "3 H W"]) -> float:
+    """How alike a drawn view and a photo are, in [-1, 1]: the correlation of their blurred gradients.
+
+    Gradients point to the brighter side, so pictures of different things are near 0 whatever they show;
+    light and contrast do not matter. Only where the view shows something; NaN where that is too little,
+    or flat.
+    """
+    weights = torch.tensor((0.299, 0.587, 0.114), dtype=torch.float32)
+    drawn = frame.rgb.float().cpu() / frame.alphas.float().cpu().clamp_min(_COVERED)[..., None]
+    greys = _blurred(torch.stack((drawn @ weights, photo.float().cpu().permute(1, 2, 0) @ weights)))
+    covered = _blurred((frame.alphas.cpu() >= _COVERED).float()[None])[0, 1:, 1:] > 1 - 1e-3
+    if float(covered.float().mean()) < _FEWEST_SHOWN:
+        return math.nan
+    across, down = greys[:, 1:, 1:] - greys[:, 1:, :-1], greys[:, 1:, 1:] - greys[:, :-1, 1:]
+    gradients = torch.stack((across, down), -1)[:, covered].double()  # (2, n, 2)
+    sizes = gradients.square().sum(-1).mean(1).sqrt()  # (2,)
+    if float(sizes.min()) < _FLAT:
+        return math.nan
+    return float(gradients.prod(0).sum(-1).mean() / sizes.prod())
+
+
+def _blurred(pictures: Float[Tensor, "n H W"]) -> Float[Tensor, "n H W"]:
+    """By `_BLUR` pixels, twice, which forgives poses a few pixels."""
+    for _ in range(2):
+        pictures = torch.nn.functional.avg_pool2d(
+            pictures[:, None], _BLUR, 1, _BLUR // 2, count_include_pad=False
+        )[:, 0]
+    return pictures
+
+
+def _doubt(frames: Sequence[Frame], views: Views) -> str:
+    """What a person is told where more than a quarter of the photos do not show what is drawn from their
+    poses, or nothing."""
+    found = [likeness(frame, photo) for frame, photo in zip(frames, views.images, strict=True)]
+    known = [each for each in found if not math.isnan(each)]
+    low = float(np.quantile(known, _SPARED, method="lower")) if known else 1.0
+    if low >= _ALIKE:
+        return ""
+    return (
+        f"the photos do not look like the scene from their poses (likeness {low:.2f} of 1); "
+        "check that the poses are in its world and its unit"
+    )
 
 
 def _carried_back(

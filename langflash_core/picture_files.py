@@ -8,6 +8,7 @@ whatever happens to it is an `OSError` here. Of pictures that move, the first is
 import ctypes
 import io
 import logging
+import struct
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -25,6 +26,12 @@ FORMATS = ("JPEG", "MPO", "PNG", "WEBP", "TIFF", "HEIF", "AVIF", "JPEG2000", "BM
 STORED = ("JPEG", "PNG", "WEBP")
 """Of pictures inside scenes and other files of ours."""
 _APART = frozenset(("HEIF", "AVIF"))
+_BRANDS = frozenset(  # of files that begin as films do, too
+    (b"heic", b"heix", b"heim", b"heis", b"hevc", b"hevx", b"mif1", b"msf1", b"avif", b"avis")
+)
+_ORIENTATION = 0x0112
+_DAMAGE = (OSError, SyntaxError, ValueError, TypeError, LookupError, ArithmeticError, AttributeError,
+           RuntimeError, struct.error)  # fmt: skip
 
 
 class TooManyPixels(OSError):
@@ -61,10 +68,37 @@ def opened_picture(
             stream.close()
 
 
+def is_picture(path: Path) -> bool:
+    """Whether a file begins as one of `FORMATS` does, whatever it is called; no pixel is decoded."""
+    try:
+        with path.open("rb") as stream:
+            start = stream.read(12)
+        if start[4:8] == b"ftyp":
+            return start[8:] in _BRANDS
+        with opened_picture(path):
+            return True
+    except _DAMAGE:
+        return False
+
+
 def picture_block(picture: Image.Image, name: str) -> bytes | None:
     """A block of a picture's file, "icc_profile" or "exif"; None where there is none, or one too long."""
     block = picture.info.get(name)
     return block if isinstance(block, bytes) and block and not PROFILE.passed_by(len(block)) else None
+
+
+def stored_shape(picture: Image.Image) -> tuple[tuple[int, int], int]:
+    """(width, height) of the pixels as they are stored, and EXIF's orientation of them, 1 to 8; of a picture
+    that was opened and not yet decoded. A broken block, or one that is too long, counts as none."""
+    try:
+        known = {} if PROFILE.passed_by(len(picture.info.get("exif") or b"")) else picture.getexif()
+        orientation = int(known.get(_ORIENTATION, 1))
+    except _DAMAGE:
+        orientation = 1
+    orientation = orientation if 1 <= orientation <= 8 else 1
+    told_upright = picture.format == "TIFF" and orientation >= 5  # Pillow turns these by itself
+    width, height = picture.size
+    return (height, width) if told_upright else (width, height), orientation
 
 
 def _identified(stream: BufferedIOBase, formats: tuple[str, ...], start: bytes) -> Image.Image:

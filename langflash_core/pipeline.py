@@ -13,6 +13,7 @@ from langflash_core.detail import DEFAULT_DETAIL
 from langflash_core.errors import InputError, PromptError, ViewError
 from langflash_core.export.html import Beside, Phrases, TextModel, write_html
 from langflash_core.images.decode import grey_photo
+from langflash_core.images.lens import Intrinsics
 from langflash_core.language.answers import answer
 from langflash_core.language.gaussians import gaussian_relevance
 from langflash_core.language.minilm import load_minilm, shipped_files
@@ -40,7 +41,7 @@ def reconstruct(
     preset: str = "mini",
     weights: Path | str | None = None,
     fov: float | Sequence[float | None] | None = None,
-    intrinsics: tuple[float, float, float, float] | None = None,
+    intrinsics: Intrinsics | Sequence[Intrinsics] | None = None,
     size: int | None = None,
     device: str = "auto",
     precision: str = "auto",
@@ -63,8 +64,8 @@ def reconstruct(
         photos: one or more files; the first one's camera becomes the world.
         preset: size of the network. weights: its checkpoint, None for the shipped one.
         fov: degrees, of the photos' longer side, one for all or one per photo. intrinsics:
-            (fx, fy, cx, cy) in pixels of the photos as given, the same for all. Neither: EXIF, else
-            an assumption with a warning.
+            (fx, fy, cx, cy) in pixels of the photos as given, the same for all or one per photo.
+            Neither: EXIF, else an assumption with a warning.
         size: the network sees about size x size pixels per photo, whatever their shape.
         precision: "float32"; "bfloat16", in the parts that bear it; "auto" takes bfloat16 on graphics
             cards and, for `full`, on processors that are quick at it.
@@ -86,7 +87,8 @@ def reconstruct(
             sought, and the scene is in that world; preset mini. None: the first photo's camera is the world.
         device: "auto" takes CUDA where there is one; "cpu"; "cuda".
         keep: a folder for what is done of it: matches, each photo's depth, what the network found. The same
-            photos and settings go on from there, to the same bits. `keeping.forget` clears it. None: nowhere.
+            photos and settings go on from there, on the same machine with as many threads to the same bits.
+            `keeping.forget` clears it. None: nowhere.
         progress: called with the stage and the fraction of the whole in [0, 1].
         cancelled: asked between stages, photos and pairs of photos, and before every layer.
         ahead: of `ahead.begin` with the same arguments, which may have been called before torch was

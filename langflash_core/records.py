@@ -162,16 +162,25 @@ def _guess_from_json(values: Mapping[str, Any]) -> Guess:
     return Guess(metres, low, high, tuple(map(str, values.get("by", ()))))
 
 
+Shift = tuple[float, float, float]
+
+
+def told_shift(shift: Shift) -> str:
+    """For people: (500,000, 4,649,776, 0)."""
+    return f"({', '.join(f'{value:,.15g}' for value in shift)})"
+
+
 @dataclass(frozen=True)
 class Record:
     """What is known of a scene besides its tensors. Mappings hold plain JSON values; empty: unknown.
 
-    preset: of the network. source: the splat file it came from. photos: names, one per view.
+    preset: of the network. source: the splat file it came from. antialiased: its splats were trained to be
+    drawn so, which splat files say. photos: names, one per view.
     warnings: a sentence each. metric_scale: metres per scene unit. network_unit: the network's
-    length units per scene unit. counts: Gaussians predicted and left out. pruning: as `prune` left
-    it. layered: every photo has a whole layer of its own (`splat.compose`). refinement: what a fit to the
-    photos brought. detail: what was spent on how fine elements, and what
-    it bought. light: `gains` and `offsets`, a row of
+    length units per scene unit. shift: what was taken off the positions of a splat file far from 0, to be put
+    back where they are written as doubles; None: nothing. counts: Gaussians predicted and left out. pruning:
+    as `prune` left it. layered: every photo has a whole layer of its own (`splat.compose`). refinement: what
+    a fit to the photos brought. detail: what was spent on how fine elements, and what it bought. light: `gains` and `offsets`, a row of
     red, green and blue for each view, by which `scene.light` brought the photos' colours to one light. lens:
     `found`, a mapping of `FoundLens` for each lens that the photos told. left_out:
     `shares`, of each view what was left out since the others do not show it (`scene.strangers`), `unplaced`,
@@ -189,10 +198,12 @@ class Record:
     preset: str | None = None
     layered: bool = False
     source: str | None = None
+    antialiased: bool = False
     photos: tuple[str, ...] = ()
     warnings: tuple[str, ...] = ()
     metric_scale: float | None = None
     network_unit: float | None = None
+    shift: Shift | None = None
     counts: Mapping[str, int] = field(default_factory=dict)
     pruning: Mapping[str, int] = field(default_factory=dict)
     refinement: Mapping[str, Any] = field(default_factory=dict)

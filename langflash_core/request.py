@@ -26,7 +26,8 @@ class ExportRequest:
     rays. fade: leave out what no photo looked at. fill: fill gaps. colormap, span: of heat-maps. detail: of
     Gaussians and pages. seconds, path: of a film, its length and "photos", "orbit", "tour" or a file of key
     frames. with_text: a page answers any phrase. beside: files of other scenes in the same page. upright:
-    Gaussians stand in the scene's world, in metres where they are known. replace: also what is there as
+    Gaussians stand in the scene's world, in metres where they are known. axes: of every .spz that is read or
+    written, one of `formats.AXES`. replace: also what is there as
     something else. backend: "gl", "torch" or None.
     """
 
@@ -51,6 +52,7 @@ class ExportRequest:
     with_text: bool = False
     beside: tuple[Path, ...] = ()
     upright: bool = False
+    axes: str | None = None
     replace: bool = False
     backend: str | None = None
 
@@ -78,11 +80,15 @@ class ExportRequest:
         said = [name for name in ("view", "camera", "size") if getattr(self, name) is not None]
         return [*said, *(name for name in ("ortho",) if self.ortho)]
 
+    def axes_of(self, path: Path) -> str | None:
+        """What is told of the axes of a file."""
+        return self.axes if kind_of(path) == ".spz" else None
+
     def words(self) -> list[str]:
         """The words after `langflash` that ask for the same."""
         words = ["export", str(self.scene), "-o", str(self.output)]
         words += ["--segmented"] if self.segmented else []
-        for name in ("what", "threshold", "view", "camera", "size", "backend", "seconds", "path"):
+        for name in ("what", "threshold", "view", "camera", "size", "backend", "seconds", "path", "axes"):
             value = getattr(self, name)
             words += [] if value is None else [f"--{name}", _said(value)]
         words += [] if self.colormap == COLOUR_MAPS[0] else ["--colormap", self.colormap]
@@ -168,8 +174,14 @@ def _check_options(request: ExportRequest, kind: Output) -> None:
         raise InputError("--detail low is for splats, scenes and web pages; name one, or leave it away")
     if request.upright and kind.subject not in ("scene", "photos"):
         raise InputError("--upright is for splats, scenes and poses of photos; name one, or leave it away")
+    if request.axes and not any(map(request.axes_of, (request.output, *_read_by(request)))):
+        raise InputError("--axes is for .spz files, read or written; name one, or leave it away")
     if request.fill and not (kind.fills and (kind.phrases == "one" or not request.prompts)):
         raise InputError("--fill is for pictures and films of the whole scene and heat-maps; leave it away")
+
+
+def _read_by(request: ExportRequest) -> tuple[Path, ...]:
+    return (*filter(None, [request.scene]), *request.beside)
 
 
 def _check_camera(request: ExportRequest, kind: Output) -> None:

@@ -380,7 +380,8 @@ class PromptAnswer:
     """One phrase answered in one view; the fields of `query --json`.
 
     score: the value compared with `threshold` to decide `found`. area: fraction of pixels in
-    the mask. centroid, box (center, axes (3, 3) rows, size): scene units, None when not found.
+    the mask. centroid, box (center, axes (3, 3) rows, size): scene units, None when not found. note: for
+    people, where the phrase may not mean what was written; "" for most.
     """
 
     prompt: str
@@ -390,6 +391,7 @@ class PromptAnswer:
     area: float
     centroid: tuple[float, float, float] | None
     box: dict | None
+    note: str = ""
 
 
 @dataclass(frozen=True)

@@ -17,9 +17,11 @@ from jaxtyping import install_import_hook
 # on a busy machine threads that wait for each other cost up to fifty times what they save.
 os.environ.setdefault("OMP_NUM_THREADS", "1")
 
-# The processes that tests start run the checkout that the tests lie in, whatever is installed.
+# The processes that tests start run the checkout that the tests lie in, whatever is installed; and where
+# products are moved here (tests/moved), then theirs, too.
 ROOT = str(Path(__file__).resolve().parent.parent)
-os.environ["PYTHONPATH"] = os.pathsep.join([ROOT, *filter(None, [os.environ.get("PYTHONPATH")])])
+MOVED = [str(Path(__file__).resolve().parent / "moved")] if os.environ.get("LANGFLASH_MOVED") else []
+os.environ["PYTHONPATH"] = os.pathsep.join([*MOVED, ROOT, *filter(None, [os.environ.get("PYTHONPATH")])])
 
 # Every signature of the library holds at every call: shapes, their shared sizes, and types. An int
 # passes for a float, as type checkers have it.
@@ -32,6 +34,12 @@ import torch  # noqa: E402 - after the threads
 
 torch.set_num_threads(int(os.environ["OMP_NUM_THREADS"]))
 
+if MOVED:
+    from tests.moved.arrays import move_arrays
+    from tests.moved.products import move_products
+
+    move_arrays()
+    move_products()
 
 _MISSING = re.compile(r"could not import .(?!sam2\b)|is not installed")
 # sam2 is Meta's own package, of which there is no wheel.

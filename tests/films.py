@@ -69,3 +69,25 @@ def turned(path: Path, degrees: int) -> Path:
 def walk(count: int = 60, step: float = 8.0) -> list[np.ndarray]:
     """A steady way along the wall."""
     return [seen(step * index) for index in range(count)]
+
+
+MPEG2, H264 = ("-c:v", "mpeg2video", "-q:v", "2"), ("-c:v", "libx264", "-preset", "veryfast")
+
+
+def interlaced(path: Path, out: Path, *codec: str) -> Path:
+    """The same film at half its rate, each picture's two fields of two moments, as a camcorder writes it."""
+    fields = "tinterlace=interleave_top,setfield=tff"
+    ffmpeg("-i", path, "-vf", fields, *codec, "-flags", "+ildct+ilme", out)
+    return out
+
+
+def mixed(path: Path, whole: float) -> Path:
+    """A film of 50 pictures a second with so many seconds of whole pictures, then interlaced ones."""
+    names = [path.with_name(name) for name in ("one.ts", "rest.mkv", "two.ts", "list.txt", "mixed.mkv")]
+    one, rest, two, both, out = names
+    ffmpeg("-i", path, "-t", str(whole), "-r", "25", *MPEG2, one)
+    ffmpeg("-ss", str(whole), "-i", path, "-c:v", "ffv1", rest)
+    interlaced(rest, two, *MPEG2)
+    both.write_text("file one.ts\nfile two.ts\n")
+    ffmpeg("-f", "concat", "-i", both, "-c", "copy", out)
+    return out

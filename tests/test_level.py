@@ -101,6 +101,15 @@ def test_ceiling_and_door_tell_how_large_it_is(world):
     assert guess.low < METRES < guess.high
 
 
+def test_a_floor_above_the_ceiling_hangs(room):
+    up = true_up(room)
+    assert not level.on_its_head(room, up)
+    assert level.on_its_head(room, -up)
+    assert not level.on_its_head(without_language(room), -up)  # nobody calls anything a floor
+    empty = room.rows(torch.zeros(len(room.gaussians), dtype=torch.bool))
+    assert not level.on_its_head(empty, -up)
+
+
 def test_a_told_height_makes_metres(room, world):
     told = measured_by(room.with_record(world=world), "ceiling", HIGH)
     assert told.record.metric_scale == pytest.approx(METRES, rel=0.02)

@@ -1,5 +1,6 @@
 """Language for plain splats: what views say of pixels comes to the Gaussians that show them."""
 
+import math
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -7,12 +8,12 @@ import pytest
 import torch
 
 from langflash_core.errors import Cancelled, InputError
-from langflash_core.lift import UPS, cameras_around, lift
+from langflash_core.lift import UPS, cameras_around, lift, likeness, own_views
 from langflash_core.scene.bare import bare_scene
 from langflash_core.scene.checks import check_scene
 from langflash_core.splat import rasterize, render
 from langflash_core.splat.backprojection import gathered
-from langflash_core.types import Camera, Gaussians, Scene
+from langflash_core.types import Camera, Frame, Gaussians, Scene
 from tests.app.cli.conftest import stripes
 from tests.export.splats import random_gaussians
 
@@ -91,7 +92,7 @@ def test_a_plain_wall_gets_its_stripes_back(known_network):
     truth = known_network.semantics.dense_weights().argmax(-1)
     right = (lifted.semantics.dense_weights().argmax(-1) == truth).float().mean()
     assert float(right) > 0.97  # at the borders a pixel shows two stripes
-    assert lifted.record.calibration == {"threshold": 0.5}
+    assert lifted.record.calibration == {"threshold": 0.5} and lifted.record.warnings == ()
     assert steps[-1] == "done" and {"drawing", "network", "carrying back"} < set(steps)
 
 
@@ -111,6 +112,22 @@ def test_views_that_show_nothing_are_refused(known_network):
     gaussians = replace(known_network.gaussians, opacities=torch.full((len(known_network.gaussians),), 1e-3))
     with pytest.raises(InputError, match="almost nothing"):
         lift(bare_scene(gaussians, "mist.ply"))
+
+
+@pytest.mark.parametrize(("up", "other"), [("-y", "y"), ("z", "-z"), ("x", "-x")])
+def test_a_scene_on_its_head_is_told_the_other_way_up(known_network, monkeypatch, up, other):
+    asked = []
+
+    def hangs(scene, upward):
+        asked.append(upward.tolist())
+        return True
+
+    monkeypatch.setattr("langflash_core.lift.on_its_head", hangs)
+    lifted = lift(bare_scene(known_network.gaussians, "wall.ply"), up=up)
+    expected = [0.0, 0.0, 0.0]
+    expected["xyz".index(up[-1])] = -1.0 if up.startswith("-") else 1.0
+    assert asked == [expected]
+    assert f"--up={other}," in lifted.record.warnings[-1]
 
 
 def test_lifting_stops_when_asked(known_network):
@@ -140,3 +157,41 @@ def test_the_axis_that_points_up_is_up_in_every_view(up):
         in_view = turn @ upward
         assert float(in_view[1]) < -0.8 and abs(float(in_view[0])) < 1e-5  # at most 35 degrees from above
         assert float((turn.T @ torch.tensor([0.0, 0, 1])) @ upward) < 0  # it looks down on things
+
+
+def checks(shift: float = 0.0) -> torch.Tensor:
+    """(48, 64, 3): a pattern without a period, moved to the right by pixels."""
+    xs, ys = torch.meshgrid(torch.arange(64.0) - shift, torch.arange(48.0), indexing="xy")
+    grey = 0.5 + 0.2 * torch.sin(xs / 3 + (ys / 9) ** 2 / 4) + 0.2 * torch.sin(ys / 4 - (xs / 11) ** 2)
+    return grey[..., None].expand(48, 64, 3)
+
+
+def drawn(rgb: torch.Tensor, alphas: torch.Tensor | None = None) -> Frame:
+    alphas = torch.ones(48, 64) if alphas is None else alphas
+    return Frame(rgb * alphas[..., None], alphas, torch.ones(48, 64))
+
+
+def test_a_view_is_like_its_photo_and_no_other():
+    photo = checks().permute(2, 0, 1)
+    assert likeness(drawn(checks()), photo) == pytest.approx(1, abs=1e-5)
+    assert likeness(drawn(0.3 * checks() + 0.1), photo) == pytest.approx(1, abs=1e-5)  # another light
+    assert likeness(drawn(1 - checks()), photo) == pytest.approx(-1, abs=1e-5)
+    assert likeness(drawn(checks(1)), photo) > 0.6  # a pose that is a pixel off
+    assert likeness(drawn(checks().flip(1)), photo) < 0.3  # mirrored
+    half = torch.ones(48, 64)
+    half[:, 32:] = 0.2
+    assert likeness(drawn(checks(), half), photo) == pytest.approx(1, abs=1e-5)  # its border is none
+    for nothing in (drawn(checks(), torch.zeros(48, 64)), drawn(torch.full((48, 64, 3), 0.4))):
+        assert math.isnan(likeness(nothing, photo))
+
+
+def test_photos_that_do_not_look_like_the_scene_are_said(known_network):
+    cameras = cameras_around(known_network, 4)
+    plain = bare_scene(known_network.gaussians, "wall.ply")
+    views = own_views([render(plain, camera) for camera in cameras], cameras)
+    viewmats = torch.stack([camera.viewmat for camera in cameras])
+    assert not lift(plain, views, viewmats).record.warnings
+    wrong = replace(views, images=1 - views.images)
+    (said,) = lift(plain, wrong, viewmats).record.warnings
+    assert "do not look like the scene" in said and "; " in said
+    assert not lift(plain).record.warnings  # views of itself

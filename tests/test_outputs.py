@@ -86,6 +86,8 @@ def test_the_command_line_reads_a_request_as_it_was(output: Output) -> None:
         replace=True,
     )
     assert said.check() is output and parsed(said) == said
+    turned = replace(said, scene=Path("a.spz"), axes="rdf")
+    assert turned.check() is output and parsed(turned) == turned
     if output.looks:
         posed = replace(said, camera=Path("c.json"), ortho=True, fade=True, backend="torch")
         assert posed.check() is output and parsed(posed) == posed
@@ -110,6 +112,7 @@ def test_every_field_of_a_request_is_an_option() -> None:
         ({"span": (0.1, 0.2)}, "colour heat-maps"),
         ({"with_text": True}, "for web pages"),
         ({"detail": "low"}, "for splats"),
+        ({"output": Path("a.ply"), "axes": "rdf"}, "--axes is for .spz files"),
         ({"fill": True, "prompts": ("plant",)}, "--fill is for"),
         ({"all_views": True, "view": 0}, "leave --view away"),
         ({"output": Path("a.ply"), "size": (2, 2)}, "holds what all views show"),

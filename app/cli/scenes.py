@@ -1,5 +1,6 @@
 """Scenes that a command is given: LangFlash's own files, and splat files of other programs."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
 from langflash_core.errors import SceneFileError
@@ -9,8 +10,11 @@ from langflash_core.types import NO_LANGUAGE, Scene
 from .report import say_warnings
 
 
-def open_scene(path: Path) -> Scene:
+def open_scene(path: Path, axes: str | None = None) -> Scene:
     """Read a scene; what a splat file left to guess or to leave out is said on stderr.
+
+    Args:
+        axes: as `export.read` takes them.
 
     Raises:
         SceneFileError: missing, damaged, or of a kind that this program does not read.
@@ -18,7 +22,14 @@ def open_scene(path: Path) -> Scene:
     readable_file(path, "scene", SceneFileError)
     from langflash_core.export import read
 
-    scene = read(path)
+    scene = read(path, axes=axes)
     if scene.semantics.space == NO_LANGUAGE:
         say_warnings(scene.record.warnings)
     return scene
+
+
+def say_hints(scene: Scene, phrases: Sequence[str]) -> None:
+    """What people should know of phrases that a scene is asked, on stderr."""
+    from langflash_core.language.hints import hints
+
+    say_warnings(hint for hint in dict.fromkeys(hints(scene, phrases)) if hint)

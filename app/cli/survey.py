@@ -59,6 +59,7 @@ def run_survey(args: Namespace, phrases: Sequence[str], negatives: Sequence[str]
         progress("writing", 0.95)
         document = write_survey(replies, left_out, staging)
     say_warnings(f"{name} was left out: {why}" for name, why in left_out)
+    say_warnings(dict.fromkeys(one.answer.note for one in replies if one.answer.note))
     if args.json:
         write_json({"folder": str(args.output), **document}, out)
         return

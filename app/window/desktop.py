@@ -2,6 +2,8 @@
 
 import ctypes
 import logging
+import os
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import replace
 from typing import Any
@@ -15,22 +17,72 @@ from .recovery.preferences import Preferences
 
 log = logging.getLogger(__name__)
 
-FIRST_SIZE = (1280, 800)
+FIRST_SIZE = (1280, 800)  # design pixels
 MIN_SIZE = (900, 560)  # design pixels; below this the panels would overlap
-_VISIBLE = 80  # pixels of a remembered window that must lie on a screen, else it starts elsewhere
-
-
-def size_of(preferences: Preferences) -> tuple[int, int]:
-    """(width, height) to open with."""
-    return (preferences.window[2], preferences.window[3]) if preferences.window else FIRST_SIZE
+Rect = tuple[int, int, int, int]  # x, y, width, height in screen pixels
 
 
 def place(window, preferences: Preferences) -> None:
-    """Where it was last, if a screen is still there."""
-    if preferences.window and _on_a_screen(preferences.window):
-        glfw.set_window_pos(window, *preferences.window[:2])
+    """Where it was last and as large, or as it was made; wholly on a screen, with what the desktop puts
+    around it. To be called before it is shown."""
+    areas, frame = work_areas(), glfw.get_window_frame_size(window)
+    made, x, y = glfw.get_window_size(window), 0, 0
+    with suppress(glfw.GLFWError):  # Wayland tells no place
+        x, y = glfw.get_window_pos(window)
+    scale = interface_scale(window)
+    left, top, width, height = preferences.window or (x, y, *made)
+    wide, high = (round(scale * side) for side in MIN_SIZE)
+    left, top, width, height = fitted((left, top, max(width, wide), max(height, high)), areas, frame)
+    least = min(wide, width), min(high, height)
+    glfw.set_window_size_limits(window, least[0], least[1], glfw.DONT_CARE, glfw.DONT_CARE)
+    if (width, height) != made:
+        glfw.set_window_size(window, width, height)
+    if (left, top) != (x, y):
+        glfw.set_window_pos(window, left, top)
     if preferences.maximised:
         glfw.maximize_window(window)
+
+
+def fitted(wanted: Rect, areas: Sequence[Rect], frame: tuple[int, int, int, int]) -> Rect:
+    """The window that is `wanted` as it fits into one of the `areas`: that which would show most of it, else
+    the first.
+
+    Args:
+        frame: pixels left, above, right and below the window that the desktop adds.
+    """
+    if not areas:
+        return wanted
+    before, after = frame[:2], frame[2:]
+    area = max(areas, key=lambda each: _overlap(wanted, each))
+    places, sizes = list[int](), list[int]()
+    for axis in (0, 1):
+        most = max(area[2 + axis] - before[axis] - after[axis], 1)
+        size = min(wanted[2 + axis], most)
+        low = area[axis] + before[axis]
+        places.append(min(max(wanted[axis], low), low + most - size))
+        sizes.append(size)
+    return (places[0], places[1], sizes[0], sizes[1])
+
+
+def _overlap(one: Rect, other: Rect) -> int:
+    """Pixels that two have in common."""
+    across, down = (
+        max(min(one[axis] + one[2 + axis], other[axis] + other[2 + axis]) - max(one[axis], other[axis]), 0)
+        for axis in (0, 1)
+    )
+    return across * down
+
+
+def work_areas() -> list[Rect]:
+    """Of every monitor what panels and docks leave, in the units of windows; the primary one's first."""
+    areas: list[Rect] = []
+    for monitor in glfw.get_monitors():
+        area, share = glfw.get_monitor_workarea(monitor), 1.0
+        if glfw.get_platform() == glfw.PLATFORM_WAYLAND:  # told in the monitor's pixels, unlike windows
+            share = max(glfw.get_monitor_content_scale(monitor)[0], 1.0)
+        if area[2] > 0 < area[3]:
+            areas.append((area[0], area[1], round(area[2] / share), round(area[3] / share)))
+    return areas
 
 
 def remembering(window, preferences: Preferences) -> Preferences:
@@ -44,17 +96,6 @@ def remembering(window, preferences: Preferences) -> Preferences:
         if width >= 200 and height >= 200:
             return replace(preferences, window=(x, y, width, height), maximised=False)
     return replace(preferences, maximised=False)
-
-
-def _on_a_screen(window: tuple[int, ...]) -> bool:
-    x, y, width, height = window
-    for monitor in glfw.get_monitors():
-        left, top, across, down = glfw.get_monitor_workarea(monitor)
-        shown_x = min(x + width, left + across) - max(x, left)
-        shown_y = min(y + height, top + down) - max(y, top)
-        if min(shown_x, shown_y) >= _VISIBLE:
-            return True
-    return False
 
 
 class GlfwLoader:
@@ -83,7 +124,10 @@ def create_context() -> moderngl.Context:
 
 
 def open_window(size: tuple[int, int]):
-    """A window with its context, current on this thread.
+    """A window with its context, current on this thread; not shown yet.
+
+    Args:
+        size: in design pixels: where windows are measured in a monitor's own pixels, its scale is added.
 
     Raises:
         GraphicsError: no display, or no OpenGL 3.3.
@@ -117,17 +161,13 @@ def _create(size: tuple[int, int]):
         glfw.OPENGL_PROFILE: glfw.OPENGL_CORE_PROFILE,
         glfw.OPENGL_FORWARD_COMPAT: True,
         glfw.SCALE_TO_MONITOR: True,
+        glfw.VISIBLE: False,
         glfw.DEPTH_BITS: 0,
         glfw.STENCIL_BITS: 0,
     }
     for hint, value in hints.items():
         glfw.window_hint(hint, value)
-    window = glfw.create_window(*size, "LangFlash", None, None)
-    if window:
-        scale = interface_scale(window)
-        width, height = (round(scale * side) for side in MIN_SIZE)
-        glfw.set_window_size_limits(window, width, height, glfw.DONT_CARE, glfw.DONT_CARE)
-    return window
+    return glfw.create_window(*size, "LangFlash", None, None)
 
 
 def interface_scale(window) -> float:
@@ -142,12 +182,27 @@ def short_name(renderer: str) -> str:
     return renderer.split(" (")[0].split("/")[0].strip()
 
 
-def clipboard(window) -> str:
-    """Its text; empty without one."""
+def clipboard(window, errors: str = "replace") -> str:
+    """Its text; empty without one. errors: as of `bytes.decode`, for what is no UTF-8."""
     text = glfw.get_clipboard_string(window)
-    return text_of(text) if text else ""
+    return text_of(text, errors) if text else ""
 
 
-def text_of(text: bytes | str) -> str:
+def text_of(text: bytes | str, errors: str = "replace") -> str:
     """What glfw says, which is bytes here and there."""
-    return text.decode(errors="replace") if isinstance(text, bytes) else text
+    return text.decode(errors=errors) if isinstance(text, bytes) else text
+
+
+def on_drop(window, dropped: Callable[[tuple[str, ...]], None]) -> object:
+    """Call `dropped` with the paths of a drop; what comes back must live as long as the window.
+
+    As glfw's own, which lets go of a whole drop where a name is not UTF-8.
+    """
+
+    def decoded(_window, count: int, paths) -> None:
+        dropped(tuple(os.fsdecode(paths[place]) for place in range(count)))
+
+    binding: Any = glfw
+    kept = binding._GLFWdropfun(decoded)
+    binding._glfw.glfwSetDropCallback(window, kept)
+    return kept

@@ -3,14 +3,14 @@
 So a key belongs to what had the focus when it was pressed, however many events share a frame.
 """
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 
 import glfw
 from imgui_bundle import imgui
 from imgui_bundle.python_backends.glfw_backend import GlfwRenderer
 
 from .commands import Command, Leave
-from .desktop import clipboard
+from .desktop import clipboard, on_drop
 from .scene.commands import OpenPaths
 
 MODIFIERS = frozenset(
@@ -51,7 +51,7 @@ class Events:
         glfw.set_window_refresh_callback(window, self._waking(lambda _window: None))
         glfw.set_window_focus_callback(window, self._waking(self._focused))
         glfw.set_window_close_callback(window, self._waking(self._asked_to_close))
-        glfw.set_drop_callback(window, self._waking(self._dropped))
+        self._drops = on_drop(window, self._waking(self._dropped))  # kept as long as glfw calls it
         glfw.set_window_content_scale_callback(window, self._waking(lambda *_: rescale()))
         imgui.get_platform_io().platform_get_clipboard_text_fn = lambda _ctx: clipboard(window)
 
@@ -109,8 +109,8 @@ class Events:
         glfw.set_window_should_close(window, False)
         self._dispatch(Leave())
 
-    def _dropped(self, _window, paths: Sequence[str]) -> None:
-        self._dispatch(OpenPaths(tuple(paths), dropped=True))
+    def _dropped(self, paths: tuple[str, ...]) -> None:
+        self._dispatch(OpenPaths(paths, dropped=True))
 
 
 def _by_letter(key: int, scancode: int) -> int:

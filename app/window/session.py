@@ -84,9 +84,9 @@ class Session:
         self._frame_seconds = 0.0
         self._panel = (0, 0)
         self._closed = False
-        self._window = desktop.open_window(size or desktop.size_of(remembered))
-        if size is None:
-            desktop.place(self._window, remembered)
+        self._window = desktop.open_window(size or desktop.FIRST_SIZE)
+        desktop.place(self._window, remembered if size is None else preferences.DEFAULTS)
+        glfw.show_window(self._window)
         self._ctx = desktop.create_context()
         imgui.create_context()
         implot.create_context()
@@ -107,7 +107,8 @@ class Session:
         keeper = Keeper()
         recovery = RecoveryEffects(hands, keeper)
         remembering = RememberingEffects(hands, self._viewport, self._thumbnails)
-        opening = OpeningEffects(hands, self._thumbnails, lambda: desktop.clipboard(self._window))
+        copied = lambda: desktop.clipboard(self._window, "surrogateescape")  # noqa: E731
+        opening = OpeningEffects(hands, self._thumbnails, copied)
         self._effects = (
             SceneEffects(hands, self._viewport, self._thumbnails, self._entitle),
             opening,

@@ -13,9 +13,9 @@ HARMONICS = "radiance:sphericalHarmonicsCoefficients"
 
 
 def answers(reader: str, request: dict[str, Any], content: bytes) -> Iterator[tuple[dict, dict]]:
-    """A part a prim, in the stage's order: facts degree (None: unsaid), up (the stage's axis) and place (4 x
-    4, local to world, columns first); arrays of `ARRAYS` (n, width) and `HARMONICS` (n bases, 3), float32,
-    orientations xyzw.
+    """A part a prim, in the stage's order: facts degree (None: unsaid), up (the stage's axis), space (of
+    colours; "" is unsaid) and place (4 x 4, local to world, columns first); arrays of `ARRAYS` (n, width) and
+    `HARMONICS` (n bases, 3), float32, orientations xyzw.
 
     Args:
         request: "path".
@@ -33,7 +33,22 @@ def answers(reader: str, request: dict[str, Any], content: bytes) -> Iterator[tu
         arrays = {name: _array(prim, name, width) for name, width in (*ARRAYS.items(), (HARMONICS, 3))}
         degree = UsdVol.ParticleField3DGaussianSplat(prim).GetRadianceSphericalHarmonicsDegreeAttr().Get()
         place = np.array(UsdGeom.Xformable(prim).ComputeLocalToWorldTransform(0)).T
-        yield {"degree": degree, "up": up, "place": place.tolist()}, arrays
+        space = _colour_space(prim)
+        yield {"degree": degree, "up": up, "space": space, "place": place.tolist()}, arrays
+
+
+def _colour_space(prim: Usd.Prim) -> str:
+    """Of a prim's harmonics: what they say themselves, else the nearest of the prim and those above it."""
+    for suffix in ("", "h"):
+        own = prim.GetAttribute(HARMONICS + suffix).GetColorSpace()
+        if own:
+            return str(own)
+    while prim:
+        said = prim.GetAttribute("colorSpace:name")  # of UsdColorSpaceAPI
+        if said and said.Get():
+            return str(said.Get())
+        prim = prim.GetParent()
+    return ""
 
 
 def _array(prim: Usd.Prim, name: str, width: int) -> np.ndarray:

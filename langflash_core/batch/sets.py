@@ -8,10 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from langflash_core.errors import InputError
+from langflash_core.formats import is_photo
 
-PHOTO_SUFFIXES = frozenset(
-    {".jpg", ".jpeg", ".png", ".webp", ".heic", ".heif", ".tif", ".tiff", ".bmp", ".avif"}
-)
 LEDGER, SUMMARY = "ledger.csv", "summary.html"
 _LONGEST_NAME = 120  # bytes; with what is put around it while it is written, below 255
 _UNFIT = re.compile(r'[/\\:*?"<>|\x00-\x1f]')  # in the name of a folder, on any system
@@ -55,7 +53,7 @@ def _sub_folders(source: Path, output: Path) -> Iterator[PhotoSet]:
     for folder in sorted(source.iterdir()):
         if not folder.is_dir() or folder.name.startswith(".") or folder.resolve() == output.resolve():
             continue
-        photos = (path for path in sorted(folder.iterdir()) if path.suffix.lower() in PHOTO_SUFFIXES)
+        photos = filter(is_photo, sorted(folder.iterdir()))
         yield PhotoSet(folder.name, tuple(photo for photo in photos if not photo.name.startswith(".")))
 
 

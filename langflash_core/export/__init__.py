@@ -2,8 +2,8 @@
 
 from pathlib import Path
 
-from langflash_core.errors import OutputError, SceneFileError
-from langflash_core.formats import kind_of
+from langflash_core.errors import LangFlashError, OutputError, SceneFileError
+from langflash_core.formats import AXES, kind_of
 from langflash_core.outputs import OUTPUTS, READERS, loaded
 from langflash_core.types import Frame, QueryResult, Scene
 
@@ -29,14 +29,19 @@ def _writers() -> dict[str, dict[str, str]]:
 WRITERS = _writers()
 
 
-def export(subject: Scene | Frame | QueryResult, path: Path | str) -> None:
+def export(subject: Scene | Frame | QueryResult, path: Path | str, *, axes: str | None = None) -> None:
     """Write `subject` in the format that the suffix of `path` names.
 
+    Args:
+        axes: of a .spz, one of `formats.AXES`, which the file then names; None: the format's own.
+
     Raises:
-        OutputError: unknown suffix, a suffix that cannot hold this subject, or an unwritable path.
+        OutputError: unknown suffix, a suffix that cannot hold this subject, or an unwritable path; or axes
+            that there are not, or of another file.
     """
     path = Path(path)
     suffix = kind_of(path)
+    more = _told_axes(path, axes, OutputError)
     writers = WRITERS.get(suffix)
     if writers is None:
         known = ", ".join(sorted(WRITERS))
@@ -45,26 +50,46 @@ def export(subject: Scene | Frame | QueryResult, path: Path | str) -> None:
         )
     field = next(field for field, (kind, _) in _SUBJECTS.items() if isinstance(subject, kind))
     if field in writers:
-        return loaded(writers[field])(subject, path)
+        return loaded(writers[field])(subject, path, **more)
     holds = " or ".join(_SUBJECTS[field][1] for field in _SUBJECTS if field in writers)
     fitting = ", ".join(sorted(ending for ending, known in WRITERS.items() if field in known))
     raise OutputError(f"cannot write {path.name}: a {suffix} file holds {holds}; use {fitting}")
 
 
-def read(path: Path | str) -> Scene:
+def read(path: Path | str, *, axes: str | None = None) -> Scene:
     """Read a scene in the format that the suffix of `path` names.
 
+    Args:
+        axes: of a .spz that does not name its own, one of `formats.AXES`; None: the format's own.
+
     Raises:
-        SceneFileError: unknown suffix, or what the reader finds wrong.
+        SceneFileError: unknown suffix, or what the reader finds wrong; or axes that there are not, or of
+            another file.
     """
     path = Path(path)
+    more = _told_axes(path, axes, SceneFileError)
     reader = READERS.get(kind_of(path), READERS.get(path.suffix.lower()))
     if reader is None:
         known = ", ".join(sorted(READERS))
         raise SceneFileError(f"{path.name} is not a scene this program reads; name a file ending in {known}")
     try:
-        return loaded(reader)(path)
+        return loaded(reader)(path, **more)
     except FileNotFoundError as error:
         raise SceneFileError(f"scene {path} does not exist; check the path") from error
     except OSError as error:
         raise SceneFileError(f"{path} cannot be read ({error.strerror}); check its permissions") from error
+
+
+def _told_axes(path: Path, axes: str | None, error: type[LangFlashError]) -> dict[str, str]:
+    """What a reader or writer is told of axes.
+
+    Raises:
+        LangFlashError: of the type `error`: there are no such axes, or the file has its format's.
+    """
+    if axes is None:
+        return {}
+    if kind_of(path) != ".spz":
+        raise error(f"{path.name} has its format's axes, which are told of a .spz alone; leave axes away")
+    if axes.lower() not in AXES:
+        raise error(f"axes {axes} are unknown; use {', '.join(AXES)}")
+    return {"axes": axes.lower()}

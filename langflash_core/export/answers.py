@@ -91,6 +91,7 @@ def answer_fields(answer: PromptAnswer, scale: float) -> dict[str, Any]:
         "area": answer.area,
         "centroid": answer.centroid and [scale * value for value in answer.centroid],
         "box": answer.box and scaled_box(answer.box, scale),
+        "note": answer.note,
     }
 
 

@@ -1,45 +1,45 @@
-"""Cameras and photos as COLMAP's text model and as transforms.json, out and in.
+"""Cameras and photos as COLMAP's model and as transforms.json, out and in.
 
 COLMAP: cameras.txt (intrinsics), images.txt (quaternion wxyz and translation, world to camera, OpenCV axes,
-one line each and one, here empty, of points), points3D.txt. transforms.json (instant-ngp, nerfstudio): camera
-to world, OpenGL axes (right, up, back), one frame a photo, intrinsics of all or of each. The photos lie in
-images/ beside the text. The centre of the top-left pixel is (0.5, 0.5) in both.
+one line each and one, here empty, of points), points3D.txt (where trainers of splats begin: some of the
+scene's Gaussians, sRGB, without tracks); `langflash_core/export/colmap.py` reads them. transforms.json
+(instant-ngp, nerfstudio): camera to world, OpenGL axes (right, up, back), one frame a photo, intrinsics of
+all or of each. The photos lie in images/ beside the text. The centre of the top-left pixel is (0.5, 0.5).
 
 Source: COLMAP's documentation (output format); nerfstudio's (data conventions).
 """
 
 import json
 import math
+import os
 import struct
 from collections.abc import Sequence
-from dataclasses import dataclass
-from pathlib import Path
+from dataclasses import dataclass, replace
+from pathlib import Path, PurePosixPath
 
 import torch
 from torch import Tensor
 
 from langflash_core.errors import OutputError, SceneFileError
+from langflash_core.export.colmap import check_pinhole, pinhole, read_model, text_lines
 from langflash_core.files import make_folder, write_atomically
-from langflash_core.geometry.cameras import invert_rigid
-from langflash_core.geometry.quaternions import matrices_to_quats, quats_to_matrices
-from langflash_core.limits import TEXT, VIEWS
-from langflash_core.picture_files import STORED, opened_picture
+from langflash_core.geometry.cameras import MIRRORED, invert_rigid, turned_camera
+from langflash_core.geometry.harmonics import SH_C0
+from langflash_core.geometry.quaternions import matrices_to_quats
+from langflash_core.limits import VIEWS
+from langflash_core.picture_files import STORED, opened_picture, stored_shape
 from langflash_core.types import Scene
 
 COLMAP, TRANSFORMS = "cameras.txt", "transforms.json"
+_BINARY = "cameras.bin"
 _IMAGES = "images"
 _FLIP = torch.diag(torch.tensor([1.0, -1.0, -1.0, 1.0], dtype=torch.float64))  # OpenGL axes and OpenCV's
-# How many numbers each COLMAP model has, and where fx, fy, cx, cy are; the rest bend straight lines.
-_MODELS = {
-    "SIMPLE_PINHOLE": (3, (0, 0, 1, 2)),
-    "PINHOLE": (4, (0, 1, 2, 3)),
-    "SIMPLE_RADIAL": (4, (0, 0, 1, 2)),
-    "RADIAL": (5, (0, 0, 1, 2)),
-    "OPENCV": (8, (0, 1, 2, 3)),
-    "FULL_OPENCV": (12, (0, 1, 2, 3)),
-}
-_PLACES = ((0, 0), (1, 1), (0, 2), (1, 2))  # of fx, fy, cx, cy in K
-_STRAIGHT = 1e-3  # distortion below which photos count as straight
+MOST_POINTS = 100_000
+"""Of points3D.txt."""
+_SOLID = 0.1  # opacity from which a Gaussian is one of them
+_BENDS = ("k1", "k2", "k3", "k4", "k5", "k6", "p1", "p2", "s1", "s2", "s3", "s4")
+_OTHER_LENSES = ("is_fisheye", "fisheye", "equirectangular", "latlong", "orthographic", "ftheta_p0")
+"""What says in a transforms.json that a lens is no pinhole, whatever its numbers are."""
 _DAMAGE = (ValueError, LookupError, TypeError, AttributeError, RecursionError, OverflowError, RuntimeError,
            struct.error)  # fmt: skip
 _REMEDY = "export it again as COLMAP text or transforms.json, of undistorted photos"
@@ -50,50 +50,108 @@ class PosedPhotos:
     """V photos with their lenses and places.
 
     paths: files, which may be missing. viewmats (V, 4, 4) float64, world to camera, OpenCV axes, in the
-    world's own unit. Ks (V, 3, 3) float64 in pixels of photos of sizes (V) (width, height).
+    world's own unit. Ks (V, 3, 3) float64 in pixels of photos of sizes (V) (width, height), as stored.
+    folder: from which on the photos' paths tell them apart.
     """
 
     paths: tuple[Path, ...]
     viewmats: Tensor
     Ks: Tensor
     sizes: tuple[tuple[int, int], ...]
+    folder: Path
+
+    @property
+    def names(self) -> tuple[str, ...]:
+        """Paths below the folder."""
+        inside = (p.relative_to(self.folder) if p.is_relative_to(self.folder) else p for p in self.paths)
+        return tuple(path.as_posix() for path in inside)
+
+    @property
+    def intrinsics(self) -> tuple[tuple[float, float, float, float], ...]:
+        """(fx, fy, cx, cy) of each photo, pixels."""
+        return tuple((float(K[0, 0]), float(K[1, 1]), float(K[0, 2]), float(K[1, 2])) for K in self.Ks)
 
     def of(self, photos: Sequence[Path]) -> "PosedPhotos":
-        """Only these photos, in their order, found by name; all, where none is named.
+        """Only these photos, in their order; all, where none is named. They are told by their paths below the
+        folder, elsewhere by as much of their path as a pose has, or by a file's name that is there once.
 
         Raises:
-            SceneFileError: a photo has no pose, or a pose no photo.
+            SceneFileError: a photo has no pose or several, or two photos have one.
         """
-        by_name = {path.name: index for index, path in enumerate(self.paths)}
-        missing = [photo.name for photo in photos if photo.name not in by_name]
-        if missing:
-            raise SceneFileError(f"there is no pose of {missing[0]}; name photos that the poses are of")
-        rows = [by_name[photo.name] for photo in photos] or list(range(len(self.paths)))
-        paths = tuple(photos) or self.paths
-        sizes = tuple(self.sizes[row] for row in rows)
-        return PosedPhotos(paths, self.viewmats[rows], self.Ks[rows], sizes)
+        if not photos:
+            return self
+        there = any(path.is_file() for path in self.paths)
+        rows = [self._row(photo, there) for photo in photos]
+        owners: dict[int, Path] = {}
+        for row, photo in zip(rows, photos, strict=True):
+            other = owners.setdefault(row, photo)
+            if other.resolve() != photo.resolve():
+                raise SceneFileError(
+                    f"{_told_path(other)} and {_told_path(photo)} would both take the pose of "
+                    f"{self.names[row]}; keep photos in the folders that the poses name"
+                )
+        return replace(self.at(rows), paths=tuple(photos))
 
-    def lens(self) -> dict:
-        """`fov` or `intrinsics` as `load_views` takes them: one lens for all, or a field of view each.
+    def at(self, rows: Sequence[int]) -> "PosedPhotos":
+        """Only some, by their places."""
+        rows = list(rows)
+        paths, sizes = (tuple(values[row] for row in rows) for values in (self.paths, self.sizes))
+        return replace(self, paths=paths, viewmats=self.viewmats[rows], Ks=self.Ks[rows], sizes=sizes)
 
-        For the photos as they lie there, which may be smaller than those the poses were found from.
+    def upright(self) -> "PosedPhotos":
+        """The same for the photos as they lie there, turned upright: they may be smaller than those that the
+        poses were found from, and EXIF may turn them, which programs that find poses leave aside.
 
         Raises:
-            SceneFileError: a photo is missing or no picture.
+            SceneFileError: a photo is missing or no picture, of another shape than its pose, or mirrored.
         """
-        lenses = []
-        for path, K, said in zip(self.paths, self.Ks, self.sizes, strict=True):
-            try:
-                with opened_picture(path) as picture:
-                    size = picture.size
-            except (OSError, ValueError, SyntaxError) as error:
-                raise SceneFileError(f"the photo {path} of a pose cannot be read; check the path") from error
-            numbers = [float(K[row, column]) for row, column in _PLACES]
-            ratios = (size[0] / said[0], size[1] / said[1])
-            lenses.append((tuple(n * ratios[index % 2] for index, n in enumerate(numbers)), size))
-        if len(set(lenses)) == 1:
-            return {"intrinsics": lenses[0][0]}
-        return {"fov": [2 * math.degrees(math.atan(max(size) / 2 / lens[0])) for lens, size in lenses]}
+        found = []
+        for path, K, viewmat, said in zip(self.paths, self.Ks, self.viewmats, self.sizes, strict=True):
+            (width, height), orientation = _shape(path)
+            size = width, height
+            if not _same_shape(size, said) and orientation >= 5 and _same_shape((height, width), said):
+                size, orientation = (height, width), 1  # poses of the upright photo
+            if not _same_shape(size, said):
+                raise SceneFileError(
+                    f"{path.name} is {width} x {height} pixels, its pose is of {said[0]} x {said[1]}; "
+                    "give the photos that the poses were found from, at any size"
+                )
+            if orientation in MIRRORED:
+                raise SceneFileError(
+                    f"{path.name} is stored mirrored (EXIF orientation {orientation}), so its pose is of a "
+                    "mirrored room; save it upright and seek the poses again"
+                )
+            own = K * torch.tensor([size[0] / said[0], size[1] / said[1], 1], dtype=K.dtype)[:, None]
+            found.append(turned_camera(own, viewmat, size, orientation))
+        Ks, viewmats, sizes = zip(*found, strict=True)
+        return replace(self, viewmats=torch.stack(viewmats), Ks=torch.stack(Ks), sizes=sizes)
+
+    def _row(self, photo: Path, there: bool) -> int:
+        """Which pose is a photo's. there: the folder holds photos of these poses, so its others have none.
+
+        Raises:
+            SceneFileError: none, or several may be.
+        """
+        own, names = photo.resolve(), [PurePosixPath(name).parts for name in self.names]
+        folder = self.folder.resolve()
+        alike = [row for row, parts in enumerate(names) if parts[-1:] == (photo.name,)]
+        if there and own.is_relative_to(folder):
+            fitting = [row for row, parts in enumerate(names) if parts == own.relative_to(folder).parts]
+        else:
+            whole = Path(os.path.abspath(photo)).parts
+            ends = [len(parts) if whole[-len(parts) :] == parts else 0 for parts in names]
+            fitting = [row for row, length in enumerate(ends) if length and length == max(ends)]
+            fitting = fitting or alike
+        if not fitting:
+            told = _told_path(photo) if alike else photo.name
+            raise SceneFileError(f"there is no pose of {told}; name photos that the poses are of")
+        if len(fitting) > 1:
+            first, second = (self.names[row] for row in fitting[:2])
+            raise SceneFileError(
+                f"the pose of {_told_path(photo)} may be that of {first} or of {second}; "
+                "keep photos in the folders that the poses name, and each there once"
+            )
+        return fitting[0]
 
 
 def write_colmap(scene: Scene, path: Path) -> None:
@@ -115,7 +173,7 @@ def write_colmap(scene: Scene, path: Path) -> None:
         quat = matrices_to_quats(viewmat[:3, :3])
         places += [f"{view + 1} {_told(quat)} {_told(viewmat[:3, 3])} {view + 1} {name}", ""]
     for name, lines in (
-        ("points3D.txt", ["# POINT3D_ID, X, Y, Z, R, G, B, ERROR, TRACK[]"]),
+        ("points3D.txt", ["# POINT3D_ID, X, Y, Z, R, G, B, ERROR, TRACK[]", *_points(scene)]),
         ("images.txt", places),
         (COLMAP, lenses),
     ):
@@ -141,24 +199,21 @@ def write_transforms(scene: Scene, path: Path) -> None:
                 "transform_matrix": pose.tolist(),
             }
         )  # fmt: skip
-    document = {"camera_model": "PINHOLE", "frames": frames}
+    straight = dict.fromkeys(("k1", "k2", "p1", "p2"), 0.0)  # some readers take no other model than OPENCV
+    document = {"camera_model": "OPENCV", **straight, "frames": frames}
     write_atomically(path, json.dumps(document, indent=1).encode())
 
 
 def read_posed(path: Path) -> PosedPhotos:
-    """Photos and poses of a transforms.json, or of COLMAP's text model in a folder or by its cameras.txt.
+    """Photos and poses of a transforms.json, or of COLMAP's model, text or binary, in a folder or by a file.
 
     Raises:
         SceneFileError: missing, damaged, or of lenses that bend straight lines.
     """
     try:
         if path.is_dir():
-            known = [
-                path / TRANSFORMS,
-                path / COLMAP,
-                path / "sparse" / "0" / COLMAP,
-                path / "sparse" / COLMAP,
-            ]
+            places = (path, path / "sparse" / "0", path / "sparse")
+            known = [path / TRANSFORMS, *(p / name for p in places for name in (COLMAP, _BINARY))]
             path = next((file for file in known if file.is_file()), path / COLMAP)
         posed = _transforms(path) if path.suffix.lower() == ".json" else _colmap(path)
         VIEWS.check(len(posed.paths), path.name, SceneFileError)
@@ -198,74 +253,84 @@ def _picture_size(photo: bytes, path: Path) -> tuple[int, int]:
         ) from error
 
 
+def _points(scene: Scene) -> list[str]:
+    """Lines of points3D.txt: at most `MOST_POINTS` Gaussians that are seen, evenly chosen."""
+    gaussians = scene.gaussians
+    solid = gaussians.means.isfinite().all(-1) & (gaussians.opacities >= _SOLID)
+    rows = solid.nonzero()[:, 0]
+    rows = rows[:: max(1, -(-len(rows) // MOST_POINTS))]
+    colours = (0.5 + SH_C0 * gaussians.sh[rows, 0]).nan_to_num(0.5).clamp(0, 1) * 255
+    places, shades = gaussians.means[rows].tolist(), colours.round().int().tolist()
+    return [
+        f"{number} {_told(place)} {' '.join(map(str, shade))} 0"
+        for number, (place, shade) in enumerate(zip(places, shades, strict=True), start=1)
+    ]
+
+
 def _told(numbers) -> str:
     return " ".join(f"{float(number):.10g}" for number in numbers)
 
 
-def _lines(path: Path) -> list[str]:
-    TEXT.check(path.stat().st_size, path.name, SceneFileError)
-    return [line for line in path.read_text("utf-8").splitlines() if not line.startswith("#")]
+def _shape(path: Path) -> tuple[tuple[int, int], int]:
+    """Size and orientation of a photo, as stored.
+
+    Raises:
+        SceneFileError: it is missing or no picture.
+    """
+    try:
+        with opened_picture(path) as picture:
+            return stored_shape(picture)
+    except (OSError, ValueError, SyntaxError) as error:
+        raise SceneFileError(f"the photo {path} of a pose cannot be read; check the path") from error
+
+
+def _same_shape(size: tuple[int, int], said: tuple[int, int]) -> bool:
+    """Whether one is the other scaled, each side rounded to within a pixel."""
+    return abs(size[0] * said[1] - size[1] * said[0]) <= max(sum(size), sum(said))
+
+
+def _told_path(photo: Path) -> str:
+    """With its folder."""
+    return f"{photo.parent.name}/{photo.name}" if photo.parent.name else photo.name
 
 
 def _colmap(path: Path) -> PosedPhotos:
     """Raises:
-    OSError: a file is missing. Any of `_DAMAGE`: it holds something else.
+    OSError: a file is missing. SceneFileError: too much. Any of `_DAMAGE`: it holds something else.
     """
-    lenses = dict(_lens(line.split()) for line in _lines(path.with_name(COLMAP)) if line.strip())
-    lines = _lines(path.with_name("images.txt"))
-    while lines and not lines[0].strip():
-        lines.pop(0)
-    paths, viewmats, Ks, sizes = [], [], [], []
-    for line in lines[::2]:  # every second is a list of points
-        if not line.strip():
-            continue
-        words = line.split(maxsplit=9)
-        numbers = torch.tensor([float(word) for word in words[1:8]], dtype=torch.float64)
-        viewmat = torch.eye(4, dtype=torch.float64)
-        viewmat[:3, :3], viewmat[:3, 3] = quats_to_matrices(numbers[:4]), numbers[4:]
-        K, size = lenses[words[8]]
-        paths.append(_photo(path.parent, words[9].strip()))
-        viewmats.append(viewmat)
-        Ks.append(K)
-        sizes.append(size)
-    return PosedPhotos(tuple(paths), torch.stack(viewmats), torch.stack(Ks), tuple(sizes))
+    seen = read_model(path)
+    names = [_portable(each.name) for each in seen]
+    places = [place / _IMAGES for place in (path.parent, *list(path.parent.parents)[:2])] + [path.parent]
+    folder = next((p for p in places if any((p / name).is_file() for name in names)), places[0])
+    Ks, sizes = zip(*(each.lens for each in seen), strict=True) if seen else ((), ())
+    viewmats = torch.stack([each.viewmat for each in seen])
+    return PosedPhotos(tuple(folder / name for name in names), viewmats, torch.stack(Ks), sizes, folder)
 
 
-def _lens(words: list[str]) -> tuple[str, tuple[Tensor, tuple[int, int]]]:
-    """Number, K and size of one line of cameras.txt."""
-    count, places = _MODELS.get(words[1], (0, ()))
-    numbers = [float(word) for word in words[4:]]
-    if len(numbers) != count or any(abs(n) > _STRAIGHT for n in numbers[max(places, default=0) + 1 :]):
-        raise ValueError(f"camera {words[0]} of model {words[1]} bends straight lines or is unknown")
-    return words[0], (_K(*(numbers[place] for place in places)), (int(words[2]), int(words[3])))
-
-
-def _photo(folder: Path, name: str) -> Path:
-    """Where a photo of a COLMAP model lies: images/ beside the text, or above sparse/0."""
-    above = [folder, *list(folder.parents)[:2]]
-    found = [place / _IMAGES / name for place in above] + [folder / name]
-    return next((file for file in found if file.is_file()), found[0])
+def _portable(name: str) -> str:
+    """A path as Windows writes it, too."""
+    return os.path.normpath(name.replace("\\", "/"))
 
 
 def _transforms(path: Path) -> PosedPhotos:
     """Raises:
     OSError: the file is missing. Any of `_DAMAGE`: it holds something else.
     """
-    document = json.loads("\n".join(_lines(path)))
+    document = json.loads("\n".join(text_lines(path)))
     paths, viewmats, Ks, sizes = [], [], [], []
     for frame in document["frames"]:
         own = {**{name: value for name, value in document.items() if name != "frames"}, **frame}
-        if any(abs(float(own.get(name, 0))) > _STRAIGHT for name in ("k1", "k2", "k3", "k4", "p1", "p2")):
-            raise ValueError("its lens bends straight lines")
+        name = str(frame["file_path"])
+        _check_lens(own, name)
         pose = torch.tensor(frame["transform_matrix"], dtype=torch.float64).reshape(-1, 4)[:3]
         pose = torch.cat((pose, torch.tensor([[0.0, 0, 0, 1]], dtype=torch.float64)))
-        paths.append(_frame_file(path.parent, str(frame["file_path"])))
+        paths.append(_frame_file(path.parent, _portable(name)))
         size = _size(own, paths[-1])
         focal = (
             float(own["fl_x"]) if "fl_x" in own else size[0] / 2 / math.tan(float(own["camera_angle_x"]) / 2)
         )
         Ks.append(
-            _K(
+            pinhole(
                 focal,
                 float(own.get("fl_y", focal)),
                 float(own.get("cx", size[0] / 2)),
@@ -274,7 +339,29 @@ def _transforms(path: Path) -> PosedPhotos:
         )
         viewmats.append(invert_rigid(pose @ _FLIP))
         sizes.append(size)
-    return PosedPhotos(tuple(paths), torch.stack(viewmats), torch.stack(Ks), tuple(sizes))
+    folder = _photo_folder(path.parent, paths)
+    return PosedPhotos(tuple(paths), torch.stack(viewmats), torch.stack(Ks), tuple(sizes), folder)
+
+
+def _check_lens(own: dict, name: str) -> None:
+    """Raises:
+    ValueError: the lens of a frame is no pinhole.
+    """
+    flags = [flag for flag in _OTHER_LENSES if own.get(flag)]
+    model = str(own.get("camera_model") or "OPENCV").upper()
+    bends = [float(own.get(key) or 0) for key in _BENDS]
+    listed = own.get("distortion_params") or []
+    check_pinhole(flags[0] if flags else model, [*bends, *(float(n) for n in listed)], f"the lens of {name}")
+
+
+def _photo_folder(folder: Path, paths: list[Path]) -> Path:
+    """From which on paths tell photos apart: the folder of a transforms.json, or the one in it that all are
+    in; where they lie elsewhere, the one that all share."""
+    inside = [path.relative_to(folder).parts for path in paths if path.is_relative_to(folder)]
+    if len(inside) < len(paths):
+        return Path(os.path.commonpath([str(path.parent) for path in paths]))
+    firsts = {parts[0] for parts in inside}
+    return folder / firsts.pop() if len(firsts) == 1 and min(map(len, inside)) > 1 else folder
 
 
 def _frame_file(folder: Path, name: str) -> Path:
@@ -286,12 +373,7 @@ def _frame_file(folder: Path, name: str) -> Path:
 def _size(own: dict, file: Path) -> tuple[int, int]:
     if "w" in own and "h" in own:
         return int(own["w"]), int(own["h"])
-    with opened_picture(file) as picture:
-        return picture.size
-
-
-def _K(fx: float, fy: float, cx: float, cy: float) -> Tensor:
-    return torch.tensor([[fx, 0, cx], [0, fy, cy], [0, 0, 1]], dtype=torch.float64)
+    return _shape(file)[0]
 
 
 def _check(posed: PosedPhotos) -> None:

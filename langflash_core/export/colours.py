@@ -1,14 +1,25 @@
-"""Colours of pictures: a heat scale of rising brightness, and hues that tell labels apart."""
+"""Colours of pictures: a heat scale of rising brightness, and hues that tell labels apart; and encodings.
+
+Scenes, pictures and nearly all splat files hold sRGB values. Materials and corners of glTF, and splats that
+say so, are linear.
+"""
 
 import colorsys
+from dataclasses import dataclass
 
 import numpy as np
 import torch
 from torch import Tensor
 
 from langflash_core.colormaps import colour_stops
+from langflash_core.export.stored import Rows
 from langflash_core.formats import COLOUR_MAPS
+from langflash_core.geometry.harmonics import SH_C0
 
+# How glTF and OpenUSD call them (of a display, of a scene; to photos that is one), and drafts of glTF's.
+_SRGB = ("srgb_rec709_display", "srgb_rec709_scene", "BT.709-sRGB")
+_LINEAR = ("lin_rec709_display", "lin_rec709_scene", "BT.709-linear")
+_UNSAID = (None, "", "raw", "data", "identity", "unknown")  # the last four as OpenUSD has them
 _GOLDEN = 0.61803398875  # successive hues stay far apart for any number of labels
 
 
@@ -23,6 +34,42 @@ def heat(values: Tensor, colormap: str = COLOUR_MAPS[0]) -> Tensor:
     lower = position.floor().clamp_max(len(stops) - 2).long()
     share = (position - lower)[..., None]
     return stops[lower] * (1 - share) + stops[lower + 1] * share
+
+
+def linear(colours: np.ndarray) -> np.ndarray:
+    """Linear values of sRGB ones in [0, 1]. Source: IEC 61966-2-1."""
+    return np.where(colours <= 0.04045, colours / 12.92, ((colours + 0.055) / 1.055) ** 2.4)
+
+
+@dataclass(frozen=True)
+class Encoding:
+    """How the colours of a file's splats are encoded. said: what a person is told of it; "" is nothing."""
+
+    linear: bool
+    said: str = ""
+
+
+def encoding_of(space: str | None, name: str) -> Encoding:
+    """The encoding of a colour space that a file called `name` names, or names none: trainers' is sRGB."""
+    if space in _LINEAR:
+        seen = "what is seen through others may look a little different"
+        return Encoding(True, f"{name} has linear colours; each became an sRGB one, so {seen}.")
+    if space in _SRGB + _UNSAID:
+        return Encoding(False)
+    shown = f"'{str(space)[:60]}', which this program does not know"
+    return Encoding(False, f"{name} has colours in {shown}; they are taken for sRGB.")
+
+
+def with_srgb_colours(rows: Rows) -> Rows:
+    """Rows of linear colours with sRGB ones: the base colour exactly, what depends on direction to first
+    order."""
+    base = np.clip(0.5 + SH_C0 * rows.sh[:, :1], 0, None)
+    low = base <= 0.0031308
+    power = np.maximum(base, 0.0031308)
+    slope = np.where(low, 12.92, 1.055 / 2.4 * power ** (1 / 2.4 - 1))
+    sh = rows.sh * slope
+    sh[:, :1] = (np.where(low, 12.92 * base, 1.055 * power ** (1 / 2.4) - 0.055) - 0.5) / SH_C0
+    return Rows(rows.means, rows.quats, rows.scales, rows.opacities, sh.astype(np.float32))
 
 
 def label_colours(count: int) -> np.ndarray:

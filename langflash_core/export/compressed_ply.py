@@ -10,14 +10,16 @@ Written along a Z curve, so that chunks are small; bounds must not be wide. Sour
 SuperSplat and splat-transform (both MIT, PlayCanvas) write it.
 """
 
+import re
 from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
 
 from langflash_core.errors import SceneFileError
+from langflash_core.export.antialiased import ply_comments, ply_model
 from langflash_core.export.packing import check_some, from_smallest_three, morton_order, smallest_three
-from langflash_core.export.ply import bytes_of, read_elements, read_ply
+from langflash_core.export.ply import HEADER_END, bytes_of, only_blanks, read_elements, read_ply
 from langflash_core.export.stored import Gathering, Rows, parts, to_scene
 from langflash_core.files import write_atomically
 from langflash_core.geometry.harmonics import MAX_SHOWN_DEGREE, SH_C0
@@ -32,17 +34,18 @@ _BOUNDS = tuple(
     for name in names
 )
 _WORDS = ("packed_position", "packed_rotation", "packed_scale", "packed_color")
+_ELEMENTS = ("chunk", "vertex", "sh")
 _DEGREES = {0: 0, 9: 1, 24: 2, 45: 3}  # by how many f_rest there are
 _SH_SPAN = 8.0
 _WIDEST = 20.0  # log scales are written within this of 0
-_MARK = b"packed_position"
+_MARK = re.compile(rb"\nproperty\s+\S+\s+packed_position(?!\S)")
 _REMEDY = "save it again, or name an uncompressed .ply"
 
 
 def is_compressed(path: Path) -> bool:
     """Whether the header of a .ply declares packed numbers."""
     with path.open("rb") as stream:
-        return _MARK in stream.read(1 << 16).split(b"end_header", 1)[0]
+        return _MARK.search(HEADER_END.split(stream.read(1 << 16), maxsplit=1)[0]) is not None
 
 
 def read_compressed_ply(path: Path) -> Scene:
@@ -58,9 +61,11 @@ def read_compressed_ply(path: Path) -> Scene:
             size = bytes_of(count, fields, order)
             if size is None or len({field for _, field in fields}) < len(fields):
                 raise SceneFileError(f"{path.name} has an element {name} that is not plain; {_REMEDY}")
-            places[name] = (start, count, np.dtype([(field, order + kind) for kind, field in fields]))
+            if name in _ELEMENTS:
+                row = np.dtype([(field, order + kind) for kind, field in fields])
+                places[name] = (start, count, row)
             start += size
-        if start != path.stat().st_size:
+        if path.stat().st_size < start or not only_blanks(path, start):
             state = "cut off" if path.stat().st_size < start else "damaged"
             raise SceneFileError(
                 f"{path.name} is {state}: it needs {start:,} bytes, found {path.stat().st_size:,}; {_REMEDY}"
@@ -70,7 +75,7 @@ def read_compressed_ply(path: Path) -> Scene:
         gathering = Gathering(count, 1 + num_rest // 3, path.name)
         for first in range(0, count, _AT_ONCE * _CHUNK):
             gathering.add(_rows(stream, places, first, num_rest))
-    return to_scene(gathering, path.name, [], logs=True, logits=False)
+    return to_scene(gathering, path.name, [], logs=True, logits=False, model=ply_model(path))
 
 
 def write_compressed_ply(scene: Scene, path: Path) -> None:
@@ -80,7 +85,7 @@ def write_compressed_ply(scene: Scene, path: Path) -> None:
         OutputError: there is nothing to write, or the path cannot be written.
     """
     check_some(scene.gaussians, path)
-    write_atomically(path, _encoded(scene.gaussians))
+    write_atomically(path, _encoded(scene.gaussians, ply_comments(scene)))
 
 
 def _check_elements(places: dict[str, tuple[int, int, np.dtype]], name: str) -> int:
@@ -96,10 +101,15 @@ def _check_elements(places: dict[str, tuple[int, int, np.dtype]], name: str) -> 
         raise SceneFileError(f"{name} holds no Gaussians; {_REMEDY}")
     missing = [field for field in _BOUNDS[:12] if field not in (bounds.names or ())]
     missing += [field for field in _WORDS if field not in (words.names or ())]
-    if missing or any(words[field].kind + str(words[field].itemsize) != "u4" for field in _WORDS):
-        lacking = ", ".join(missing[:3]) or "words"
-        raise SceneFileError(f"{name} is incomplete: it has no {lacking}; {_REMEDY}")
-    num_rest = len(rest.names or ())
+    if missing:
+        raise SceneFileError(f"{name} is incomplete: it has no {', '.join(missing[:3])}; {_REMEDY}")
+    harmonics = [field for field in rest.names or () if field.startswith("f_rest_")]
+    for row, fields, kind in ((bounds, _BOUNDS, "f4"), (words, _WORDS, "u4"), (rest, harmonics, "u1")):
+        other = [field for field in fields if field in (row.names or ()) and row[field].str[1:] != kind]
+        if other:
+            found = f"{other[0]} as {row[other[0]].name}"
+            raise SceneFileError(f"{name} stores {found}, expected {np.dtype(kind).name}; {_REMEDY}")
+    num_rest = len(harmonics)
     names_hold = all(f"f_rest_{index}" in (rest.names or ()) for index in range(num_rest))
     if num_rest not in _DEGREES or not names_hold or (num_rest and rest_count != count):
         raise SceneFileError(f"{name} has harmonics that do not fit its Gaussians; {_REMEDY}")
@@ -149,7 +159,7 @@ def _fields(words: np.ndarray, shifts: tuple[int, ...], bits: tuple[int, ...]) -
     return ((words[:, None].astype(np.uint32) >> np.array(shifts, np.uint32)) & tops) / tops
 
 
-def _encoded(gaussians: Gaussians) -> Iterator[bytes]:
+def _encoded(gaussians: Gaussians, comments: list[str]) -> Iterator[bytes]:
     num_bases = min(gaussians.sh.shape[1], (MAX_SHOWN_DEGREE + 1) ** 2)
     count, num_rest = len(gaussians), 3 * (num_bases - 1)
     order = morton_order(gaussians.means.detach().cpu().double().numpy())
@@ -162,7 +172,8 @@ def _encoded(gaussians: Gaussians) -> Iterator[bytes]:
             words.append(packed)
         flat = part.sh[:, 1:num_bases].transpose(0, 2, 1).reshape(len(part.means), num_rest)
         rest.append(np.clip(np.trunc((flat / _SH_SPAN + 0.5) * 256), 0, 255).astype(np.uint8).tobytes())
-    lines = ["ply", "format binary_little_endian 1.0", "comment LangFlash", f"element chunk {len(bounds)}"]
+    lines = ["ply", "format binary_little_endian 1.0", "comment LangFlash", *comments]
+    lines += [f"element chunk {len(bounds)}"]
     lines += [f"property float {name}" for name in _BOUNDS]
     lines += [f"element vertex {count}", *(f"property uint {name}" for name in _WORDS)]
     if num_rest:

@@ -2,6 +2,9 @@
 
 glTF has +x to the left, +y up and +z forward; scenes have +x to the right and +y down. One half turn
 about z leads from one to the other, as for the splats (`gltf.py`), so that both lie together.
+
+Colours of materials and of corners are linear, as glTF wants; the latter in 16 bits, for 8 would show steps
+in the dark. No material is a metal.
 """
 
 from collections.abc import Sequence
@@ -12,7 +15,7 @@ import numpy as np
 from jaxtyping import Float
 
 from langflash_core.errors import PromptError
-from langflash_core.export.colours import label_colours
+from langflash_core.export.colours import label_colours, linear
 from langflash_core.files import write_atomically
 from langflash_core.geometry.fusion import Surface
 from langflash_core.types import QueryResult
@@ -23,6 +26,8 @@ if TYPE_CHECKING:
 _TO_GLTF = np.diag([-1.0, -1.0, 1.0, 1.0])
 _OPACITY = 0.35  # what stands in the box stays visible
 _THINNEST = 1e-3  # of the longest side: a flat thing still gets a body
+_CORNERS = "_LINEAR"
+"""An attribute of corners that becomes COLOR_0: trimesh writes that one in 8 bits alone."""
 
 
 def write_answer(result: QueryResult, path: Path) -> None:
@@ -49,24 +54,14 @@ def write_boxes(boxes: Sequence[tuple[str, dict[str, Any]]], path: Path) -> None
     if not boxes:
         raise PromptError("nothing was found, so there is no box to write; lower the threshold")
     import trimesh  # late: half a second that no other format needs
-    from trimesh.visual.material import PBRMaterial
-    from trimesh.visual.texture import TextureVisuals
 
-    scene = trimesh.Scene(base_frame="langflash")
-    for (name, box), colour in zip(boxes, label_colours(len(boxes)), strict=True):
+    scene, colours = trimesh.Scene(base_frame="langflash"), linear(label_colours(len(boxes)) / 255)
+    for name, box in boxes:
         size = np.asarray(box["size"], float)
         body = trimesh.creation.box(np.maximum(size, _THINNEST * max(size.max(), _THINNEST)))
-        material = PBRMaterial(
-            name=name,
-            baseColorFactor=[*colour, round(255 * _OPACITY)],
-            metallicFactor=0.0,
-            roughnessFactor=1.0,
-            alphaMode="BLEND",
-            doubleSided=True,
-        )
-        body.visual = TextureVisuals(material=material)
+        body.visual = _no_metal(name, alphaMode="BLEND")
         scene.add_geometry(body, node_name=name, geom_name=name, transform=_TO_GLTF @ _pose(box))
-    _write(scene, path)
+    _write(scene, path, [[*colour.tolist(), _OPACITY] for colour in colours])
 
 
 def write_surfaces(surfaces: Sequence[tuple[str, Surface]], path: Path, scale: float = 1.0) -> None:
@@ -82,18 +77,40 @@ def write_surfaces(surfaces: Sequence[tuple[str, Surface]], path: Path, scale: f
     if not surfaces:
         raise PromptError("no view shows a surface of it, so there is none to write; lower the threshold")
     import trimesh
-    from trimesh.visual.color import ColorVisuals
 
     scene = trimesh.Scene(base_frame="langflash")
     for name, surface in surfaces:
+        colours = np.full((len(surface.vertices), 4), 65535, np.uint16)
+        colours[:, :3] = np.round(65535 * linear(surface.colours / 255))
         mesh = trimesh.Trimesh(scale * surface.vertices, surface.faces, process=False)
-        mesh.visual = ColorVisuals(mesh, vertex_colors=surface.colours)
+        mesh.visual = _no_metal(name)
+        mesh.vertex_attributes[_CORNERS] = colours
         scene.add_geometry(mesh, node_name=name, geom_name=name, transform=_TO_GLTF)
     _write(scene, path)
 
 
-def _write(scene: "trimesh.Scene", path: Path) -> None:
-    content = scene.export(file_type="glb")
+def _no_metal(name: str, **more: str) -> Any:
+    """A material seen from both sides; what says nothing is a metal to glTF, and dark."""
+    from trimesh.visual.material import PBRMaterial
+    from trimesh.visual.texture import TextureVisuals
+
+    material = PBRMaterial(name=name, metallicFactor=0.0, roughnessFactor=1.0, doubleSided=True, **more)
+    return TextureVisuals(material=material)
+
+
+def _write(scene: "trimesh.Scene", path: Path, colours: Sequence[list[float]] = ()) -> None:
+    """colours: linear, of the materials in order; none: white."""
+
+    def linearly(tree: dict[str, Any]) -> None:
+        for material, colour in zip(tree["materials"], colours, strict=False):
+            material["pbrMetallicRoughness"]["baseColorFactor"] = colour
+        for mesh in tree["meshes"]:
+            attributes = mesh["primitives"][0]["attributes"]
+            if _CORNERS in attributes:
+                attributes["COLOR_0"] = attributes.pop(_CORNERS)
+                tree["accessors"][attributes["COLOR_0"]]["normalized"] = True
+
+    content = scene.export(file_type="glb", tree_postprocessor=linearly)
     assert isinstance(content, bytes)
     write_atomically(path, content)
 

@@ -62,7 +62,9 @@ def read_ksplat(path: Path) -> Scene:
     with path.open("rb") as stream:
         major, minor, room, used, count, level, *limits = _MAIN.unpack(stream.read(_MAIN.size))
         if (major, minor > 0) != (0, True) or level > 2 or used > room:
-            raise SceneFileError(f"{path.name} is not a .ksplat of version 0.1, compressed 0 to 2; {_REMEDY}")
+            found = f"version {major}.{minor}, compressed {level}"
+            read = "this program reads version 0.1, compressed 0 to 2"
+            raise SceneFileError(f"{path.name} is no .ksplat, or one of {found}, {read}; {_REMEDY}")
         if _HEADER + room * _SECTION > size:
             raise SceneFileError(f"{path.name} is cut off: {room:,} sections have no room in it; {_REMEDY}")
         stream.seek(_HEADER)
@@ -84,13 +86,19 @@ def _sections(headers: bytes, room: int, level: int, size: int, name: str) -> li
     """
     sections, start = [], _HEADER + room * _SECTION
     for index in range(room):
+        if not any(headers[index * _SECTION : (index + 1) * _SECTION]):
+            continue  # room that was not needed
         values = _PART.unpack_from(headers, index * _SECTION)
         count, most, capacity, buckets, side, bucket_bytes, steps, full, partial, degree = values
         section = _Section(
             count, most, capacity, buckets, side, bucket_bytes, steps or _STEPS[level], full, partial, degree,
             start,
         )  # fmt: skip
-        if degree > 3 or count > most or full + partial > buckets or (level and bucket_bytes != 12):
+        if degree > 3:
+            raise SceneFileError(
+                f"{name} has harmonics of degree {degree}, this program reads 0 to 3; {_REMEDY}"
+            )
+        if count > most or full + partial > buckets or (level and bucket_bytes != 12):
             raise SceneFileError(f"{name} is damaged: section {index} contradicts itself; {_REMEDY}")
         start = section.rows_start + most * _row(level, degree).itemsize
         if start > size:

@@ -65,12 +65,12 @@ def with_language(scene: Scene, block: bytes, name: str) -> Scene:
         fields, described = _unpacked(block)
         if described["positions"] != _fingerprint(scene.gaussians):
             return _warned(scene, f"{name} belongs to other Gaussians than these; they were read without it.")
-        photos = tuple(
-            fields[photo].numpy().tobytes() for photo in sorted(f for f in fields if f.startswith("photo_"))
-        )
+        names = sorted((f for f in fields if f.startswith("photo_")), key=lambda name: (len(name), name))
+        photos = tuple(fields[photo].numpy().tobytes() for photo in names)
         for limit, part in ((ATOMS, "dictionary"), (VIEWS, "viewmats")):
             if limit.passed_by(len(fields[part])):
                 raise ValueError(f"{len(fields[part]):,} {limit.name}; {limit.remedy()}")
+        known = from_json(dict(described["metadata"]))
         width, height = (int(side) for side in described["view_size"])
         whole = replace(
             scene,
@@ -85,7 +85,7 @@ def with_language(scene: Scene, block: bytes, name: str) -> Scene:
             view_size=(width, height),
             photos=photos,
             view_ids=fields["view_ids"].long() if "view_ids" in fields else None,
-            record=from_json(dict(described["metadata"])),
+            record=replace(known, antialiased=known.antialiased or scene.record.antialiased),
             levels=fields.get("levels"),
             confidences=fields["confidences"].float() / 255 if "confidences" in fields else None,
         )

@@ -30,6 +30,7 @@ def turned(rows: Rows, matrix: torch.Tensor) -> Rows:
     return Rows(moved.numpy(), quats.numpy(), rows.scales, rows.opacities, sh.numpy())
 
 
+@np.errstate(over="ignore", invalid="ignore")  # rows that are not finite stay out
 def placed(rows: Rows, place: np.ndarray, axes: str) -> Rows:
     """Rows below a node of another scene graph, in the axes of a `Scene`.
 
@@ -38,8 +39,10 @@ def placed(rows: Rows, place: np.ndarray, axes: str) -> Rows:
         axes: of that world, three letters.
 
     Raises:
-        ValueError: the node stretches its axes by different amounts, or to nothing.
+        ValueError: the node stretches its axes by different amounts, to nothing, or out of the world.
     """
+    if not np.isfinite(place).all():
+        raise ValueError("a node's place is not finite")
     linear, ours = place[:3, :3], axes_matrix(axes).T
     size = float(np.cbrt(abs(np.linalg.det(linear))))
     if not size > 0 or np.abs(linear.T @ linear / size**2 - np.eye(3)).max() > _EVEN:

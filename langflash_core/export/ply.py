@@ -1,8 +1,9 @@
 """3D Gaussian Splatting's PLY: x y z, f_dc, f_rest, logit opacity, log scales, rot wxyz.
 
 f_rest is channel-major: f_rest_{c (S - 1) + b - 1} is basis b >= 1 of colour c. Read in either byte
-order, with properties of any numeric type, in any order, and with others between them. Written as
-binary_little_endian float32 with spherical harmonics up to degree 3, the most that viewers show.
+order, with floats of any size, in any order, and with others between them; what else there is,
+`ply_numbers.py` has. Written as binary_little_endian float32 with spherical harmonics up to degree 3, the
+most that viewers show.
 Source: Kerbl et al. 2023 (the layout of point_cloud.ply); Turk 1994 (the PLY format).
 """
 
@@ -14,20 +15,29 @@ from pathlib import Path
 from typing import BinaryIO
 
 import numpy as np
-from numpy.lib.recfunctions import structured_to_unstructured
 
 from langflash_core.errors import SceneFileError
+from langflash_core.export.antialiased import filter_of, filtered, ply_comments, ply_model
 from langflash_core.export.language import packed_language, side_car, speaks, with_language
-from langflash_core.export.stored import ROWS_AT_ONCE, Gathering, Rows, logit, parts, to_scene
+from langflash_core.export.ply_numbers import (
+    DC,
+    MEANS,
+    QUATS,
+    SCALES,
+    Numbers,
+    block,
+    missing_fields,
+    numbers_of,
+    shift_line,
+)
+from langflash_core.export.ply_numbers import REMEDY as _REMEDY
+from langflash_core.export.stored import ANTIALIASED, ROWS_AT_ONCE, Gathering, Rows, logit, parts, to_scene
 from langflash_core.files import write_atomically
 from langflash_core.geometry.harmonics import MAX_SHOWN_DEGREE
+from langflash_core.records import Shift
 from langflash_core.types import Gaussians, Scene
 
-_MEANS, _NORMALS = ("x", "y", "z"), ("nx", "ny", "nz")
-_DC = ("f_dc_0", "f_dc_1", "f_dc_2")
-_SCALES = ("scale_0", "scale_1", "scale_2")
-_QUATS = ("rot_0", "rot_1", "rot_2", "rot_3")
-_REQUIRED = (*_MEANS, *_DC, "opacity", *_SCALES, *_QUATS)
+_NORMALS = ("nx", "ny", "nz")
 _DEGREES = {0: 0, 9: 1, 24: 2, 45: 3, 72: 4}  # of spherical harmonics, by how many f_rest there are
 _TYPES = {
     **dict.fromkeys(("char", "int8"), "i1"),
@@ -36,13 +46,15 @@ _TYPES = {
     **dict.fromkeys(("ushort", "uint16"), "u2"),
     **dict.fromkeys(("int", "int32"), "i4"),
     **dict.fromkeys(("uint", "uint32"), "u4"),
+    **dict.fromkeys(("half", "float16"), "f2"),
     **dict.fromkeys(("float", "float32"), "f4"),
     **dict.fromkeys(("double", "float64"), "f8"),
 }
 _ORDERS = {"binary_little_endian": "<", "binary_big_endian": ">"}
 _MAX_HEADER = 1 << 16  # bytes; 3DGS headers have about 1,500
+HEADER_END = re.compile(rb"\nend_header[ \t]*\r?\n")
 _OWN = "stored as logit opacity, log scales"  # a comment that leaves nothing to guess
-_REMEDY = "export it again as a binary 3D Gaussian Splatting .ply"
+_BLANKS = 16  # bytes of white space behind the last element, which are no damage
 _TOO_WIDE = 0.05  # of the scene: no capture is made of Gaussians that large
 
 
@@ -72,43 +84,60 @@ def read_ply(path: Path) -> Scene:
         _check_size(path, layout)
         num_bases = 1 + layout.num_rest // 3
         gathering = Gathering(layout.count, num_bases, path.name)
+        stream.seek(0)
+        head = stream.read(layout.start)
+        rows = np.fromfile(stream, layout.row, min(ROWS_AT_ONCE, layout.count))
+        numbers = numbers_of(rows, head, path.name)
         stream.seek(layout.start)
         for first in range(0, layout.count, ROWS_AT_ONCE):
-            rows = np.fromfile(stream, layout.row, min(ROWS_AT_ONCE, layout.count - first))
-            gathering.add(_columns(rows, num_bases))
-    stored, warnings = gathering.stored(), []
-    logits = layout.own or not _looks_activated(stored.opacities)
-    logs = layout.own or not _looks_linear(stored)
+            rows = np.fromfile(stream, numbers.row, min(ROWS_AT_ONCE, layout.count - first))
+            gathering.add(_filtered(_columns(rows, num_bases, numbers), rows))
+    model = ANTIALIASED if filter_of(layout.row.names) else ply_model(path)
+    scene = _activated(gathering, numbers, path.name, layout, model)
+    beside = side_car(path)
+    return with_language(scene, beside.read_bytes(), beside.name) if beside.is_file() else scene
+
+
+def _activated(gathering: Gathering, numbers: Numbers, name: str, layout: _Layout, model: str) -> Scene:
+    """The scene of gathered rows. model: as `to_scene` takes it."""
+    stored, warnings = gathering.stored(), list(numbers.said)
+    known = layout.own or filter_of(layout.row.names) is not None  # whose writers leave nothing to guess
+    logits = known or not _looks_activated(stored.opacities)
+    logs = known or not _looks_linear(stored)
     if not logits:
         warnings.append("All opacities lie between 0 and 1, so they are taken as they are, not as logits.")
     if not logs:
         warnings.append("The scales are no logarithms (they would fill the scene); taken as lengths.")
-    scene = to_scene(gathering, path.name, warnings, logs=logs, logits=logits)
-    beside = side_car(path)
-    return with_language(scene, beside.read_bytes(), beside.name) if beside.is_file() else scene
+    numbers.complete(stored, name, logs=logs)
+    scene = to_scene(gathering, name, warnings, logs=logs, logits=logits, model=model)
+    return scene if numbers.shift is None else scene.with_record(shift=numbers.shift)
 
 
 def write_ply(scene: Scene, path: Path) -> None:
     """The Gaussians of a scene, as viewers of 3D Gaussian Splatting read them; its language beside it.
 
+    Positions of a scene that was shifted are written where they were, as doubles.
+
     Raises:
         OutputError: the path cannot be written.
     """
-    write_atomically(path, _encoded(scene.gaussians))
+    write_atomically(path, _encoded(scene.gaussians, scene.record.shift, ply_comments(scene)))
     if speaks(scene):
         write_atomically(side_car(path), packed_language(scene))
 
 
-def _encoded(gaussians: Gaussians) -> Iterator[bytes]:
+def _encoded(gaussians: Gaussians, shift: Shift | None, comments: list[str]) -> Iterator[bytes]:
     num_bases = min(gaussians.sh.shape[1], (MAX_SHOWN_DEGREE + 1) ** 2)
     rest = [f"f_rest_{index}" for index in range(3 * (num_bases - 1))]
-    names = (*_MEANS, *_NORMALS, *_DC, *rest, "opacity", *_SCALES, *_QUATS)
-    lines = ["ply", "format binary_little_endian 1.0", f"comment LangFlash: {_OWN}"]
-    lines += [f"element vertex {len(gaussians)}", *(f"property float {name}" for name in names), "end_header"]
+    names = (*MEANS, *_NORMALS, *DC, *rest, "opacity", *SCALES, *QUATS)
+    lines = ["ply", "format binary_little_endian 1.0", f"comment LangFlash: {_OWN}", *comments]
+    lines += [] if shift is None else [shift_line(shift)]
+    doubles = () if shift is None else MEANS
+    properties = (f"property {'double' if name in doubles else 'float'} {name}" for name in names)
+    lines += [f"element vertex {len(gaussians)}", *properties, "end_header"]
     yield ("\n".join(lines) + "\n").encode()
     for part in parts(gaussians):
         columns = (
-            part.means,
             np.zeros_like(part.means),
             part.sh[:, 0],
             part.sh[:, 1:num_bases].transpose(0, 2, 1).reshape(len(part.means), -1),
@@ -116,7 +145,9 @@ def _encoded(gaussians: Gaussians) -> Iterator[bytes]:
             np.log(part.scales),
             part.quats,
         )
-        yield np.concatenate(columns, 1, dtype="<f4").tobytes()
+        means = part.means if shift is None else part.means.astype("<f8") + np.array(shift)
+        stored = (np.ascontiguousarray(means), np.concatenate(columns, 1, dtype="<f4"))
+        yield np.concatenate([values.view(np.uint8) for values in stored], 1).tobytes()
 
 
 def _read_layout(stream: BinaryIO, name: str) -> _Layout:
@@ -152,7 +183,7 @@ def read_elements(stream: BinaryIO, name: str) -> tuple[str, list["_Element"], i
         raise SceneFileError(f"{name} is an empty file; {_REMEDY}")
     if not re.match(rb"ply\s*\n", head):
         raise SceneFileError(f"{name} is not a PLY file, whatever its name says; {_REMEDY}")
-    ended = re.search(rb"\nend_header\r?\n", head)
+    ended = HEADER_END.search(head)
     if ended is None:
         state = "cut off inside its header" if len(head) < _MAX_HEADER else "damaged: its header does not end"
         raise SceneFileError(f"{name} is {state}; {_REMEDY}")
@@ -173,6 +204,8 @@ def _elements(lines: list[list[str]], name: str) -> tuple[str, list[_Element]]:
                 raise SceneFileError(f"{name} is an ascii PLY, this program reads binary ones; {_REMEDY}")
             case ["format", kind, *_] if kind in _ORDERS:
                 order = _ORDERS[kind]
+            case ["element", element, _] if element in [name for name, *_ in elements]:
+                raise SceneFileError(f"{name} has two elements {element}; {_REMEDY}")
             case ["element", element, count] if count.isdecimal() and len(count) <= _DIGITS:
                 elements.append((element, int(count), []))
             case ["property", "list", *_, field] if elements:
@@ -191,7 +224,7 @@ def _elements(lines: list[list[str]], name: str) -> tuple[str, list[_Element]]:
 def _row(fields: list[tuple[str, str]], order: str, name: str) -> np.dtype:
     names = [field for _, field in fields]
     lists = [field for kind, field in fields if kind == "list"]
-    missing = [field for field in _REQUIRED if field not in names]
+    missing = missing_fields(names)
     num_rest = sum(field.startswith("f_rest_") for field in names)
     if lists:
         raise SceneFileError(f"{name} has a list ({lists[0]}) among the points' numbers; {_REMEDY}")
@@ -217,7 +250,7 @@ def _check_size(path: Path, layout: _Layout) -> None:
         raise SceneFileError(f"{path.name} holds no Gaussians; {_REMEDY}")
     found, needed = path.stat().st_size, layout.start + layout.count * layout.row.itemsize
     expected = needed if layout.end is None else layout.end
-    if found < expected or (layout.end is not None and found > expected):
+    if found < expected or (layout.end is not None and not only_blanks(path, expected)):
         state = "cut off" if found < expected else "damaged"
         raise SceneFileError(
             f"{path.name} is {state}: {layout.count:,} Gaussians need {expected:,} bytes, "
@@ -225,18 +258,28 @@ def _check_size(path: Path, layout: _Layout) -> None:
         )
 
 
-def _columns(rows: np.ndarray, num_bases: int) -> Rows:
+def only_blanks(path: Path, end: int) -> bool:
+    """Whether nothing but a little white space, as writers of text leave it, lies behind byte `end`."""
+    with path.open("rb") as stream:
+        stream.seek(end)
+        after = stream.read(_BLANKS + 1)
+    return len(after) <= _BLANKS and not after.strip()
+
+
+def _columns(rows: np.ndarray, num_bases: int, numbers: Numbers) -> Rows:
     """The numbers of structured rows (n,), float32."""
-
-    def block(names: tuple[str, ...]) -> np.ndarray:
-        return structured_to_unstructured(rows[list(names)], dtype=np.float32)
-
     sh = np.empty((len(rows), num_bases, 3), np.float32)
-    sh[:, 0] = block(_DC)
+    sh[:, 0] = numbers.colours(rows)
     if num_bases > 1:
-        rest = block(tuple(f"f_rest_{index}" for index in range(3 * (num_bases - 1))))
+        rest = block(rows, tuple(f"f_rest_{index}" for index in range(3 * (num_bases - 1))))
         sh[:, 1:] = rest.reshape(-1, 3, num_bases - 1).transpose(0, 2, 1)
-    return Rows(block(_MEANS), block(_QUATS), block(_SCALES), block(("opacity",))[:, 0], sh)
+    opacities = block(rows, ("opacity",))[:, 0]
+    return Rows(numbers.means(rows), block(rows, QUATS), numbers.scales(rows), opacities, sh)
+
+
+def _filtered(stored: Rows, rows: np.ndarray) -> Rows:
+    name = filter_of(rows.dtype.names)
+    return stored if name is None else filtered(stored, rows[name])
 
 
 def _looks_activated(opacities: np.ndarray) -> bool:

@@ -26,7 +26,7 @@ from PIL import Image
 from langflash_core.errors import OutputError, SceneFileError
 from langflash_core.export.packing import check_some, from_smallest_three, morton_order, told
 from langflash_core.export.quantised import Palette, quantised
-from langflash_core.export.stored import ROWS_AT_ONCE, Gathering, Rows, to_scene
+from langflash_core.export.stored import ANTIALIASED, PLAIN, ROWS_AT_ONCE, Gathering, Rows, to_scene
 from langflash_core.files import make_folder, write_atomically
 from langflash_core.formats import SOG_FOLDER
 from langflash_core.limits import FILES, GAUSSIANS
@@ -152,7 +152,8 @@ def _read(name: str, open_file: _Opener) -> Scene:
             sh[:, 1:] = harmonics[0][harmonics[1][some]]
         opacities = colours[some, 3] / np.float32(255)
         gathering.add(Rows(means, _quats(quats[some]), books["scales"][scales[some, :3]], opacities, sh))
-    return to_scene(gathering, name, [], logs=True, logits=False)
+    model = str(meta.get("model") or PLAIN)
+    return to_scene(gathering, name, [], logs=True, logits=False, model=model)
 
 
 def _pixels(content: bytes, needed: int, name: str) -> np.ndarray:
@@ -218,6 +219,8 @@ def _encoded(scene: Scene) -> dict[str, bytes]:
         "quats": {"files": ["quats.webp"]},
         "sh0": {"codebook": stored.colour_book.tolist(), "files": ["sh0.webp"]},
     }  # fmt: skip
+    if scene.record.antialiased:
+        meta["model"] = ANTIALIASED
     if stored.harmonics is not None:
         meta["shN"], more = _encoded_harmonics(stored.harmonics)
         files |= more

@@ -6,7 +6,8 @@ degree 1 and 4 above, as the format's own writer does). Rotations: versions 3 an
 three entries of xyzw as sign and 9 bits, version 2 stores x y z as 8 bits each. Versions 2 and 3 are one
 gzip stream, version 4 is a zstd stream per attribute behind a plain header.
 
-Axes: right, up, back, unless the extension SPZ_ADOBE_coordinate_system names others.
+Axes: right, up, back, unless the extension SPZ_ADOBE_coordinate_system names others. SuperSplat and
+splat-transform neither turn nor name them: their numbers are a PLY's, right, down, forward.
 Source: nianticlabs/spz (MIT) at 21715c3: README.md, extensions/README.md.
 """
 
@@ -29,23 +30,25 @@ from langflash_core.export.packing import (
     zstd_inflated,
     zstd_packed,
 )
-from langflash_core.export.stored import ROWS_AT_ONCE, Gathering, Rows, parts, to_scene
+from langflash_core.export.stored import ANTIALIASED, PLAIN, ROWS_AT_ONCE, Gathering, Rows, parts, to_scene
 from langflash_core.files import write_atomically
+from langflash_core.formats import AXES
 from langflash_core.geometry.harmonics import MAX_SHOWN_DEGREE
 from langflash_core.geometry.turning import axes_matrix
+from langflash_core.scene.standing import on_its_head
 from langflash_core.types import Gaussians, Scene
 
 _MAGIC = b"NGSP"
 _HEAD = struct.Struct("<4sIIBBBB")  # magic, version, count, degree, fractional bits, flags, streams
 _ZSTD_HEAD = 32  # bytes: _HEAD, the place of the table of contents, 12 spare ones
-_ANTIALIASED, _EXTENDED = 1, 2  # flags
+_SMOOTHED, _EXTENDED = 1, 2  # flags
 _AXES_EXTENSION = 0xADBE0003
+_MOST_EXTENSIONS = 1 << 20  # bytes of versions 2 and 3, which do not say how many there are
 _STORED_AXES = "RUB"
-# By the extension's number, from 1.
-_NAMED_AXES = (
-    "LDB", "RDB", "LUB", "RUB", "LDF", "RDF", "LUF", "RUF", "LFD", "RFD", "LFU", "RFU", "LBD", "RBD", "LBU",
-    "RBU",
-)  # fmt: skip
+_ON_ITS_HEAD = (
+    "The scene seems to stand on its head; if SuperSplat or splat-transform wrote it, read it with --axes "
+    "rdf."
+)
 _COLOUR_SCALE = 0.15
 _SH_STEPS = (8, 16)  # of 256, degree 1 and above: 5 and 4 significant bits
 _MOST_BITS = 16  # of the fraction of a position; a scene 128 units wide keeps them all
@@ -73,8 +76,11 @@ class _Header:
         return [self.count * each for each in (9, 1, 3, 3, 3 if self.version == 2 else 4, rest)]
 
 
-def read_spz(path: Path) -> Scene:
+def read_spz(path: Path, *, axes: str | None = None) -> Scene:
     """A scene without language from a .spz.
+
+    Args:
+        axes: of `formats.AXES`, of a file that does not name its own; None: the format's.
 
     Raises:
         SceneFileError: missing, no .spz of these versions, cut off, or without a usable Gaussian; or
@@ -87,21 +93,22 @@ def read_spz(path: Path) -> Scene:
         header, streams, extensions = _unzipped(content, path.name)
     else:
         header, streams, extensions = _unpacked(content, path.name)
-    matrix = axes_matrix(_axes(extensions)).T  # to ours
+    named = _named_axes(extensions, path.name)
+    matrix = axes_matrix(named or axes or _STORED_AXES).T  # to ours
     gathering = Gathering(header.count, header.num_shown, path.name)
     for first in range(0, header.count, ROWS_AT_ONCE):
         gathering.add(turned(_rows(header, streams, slice(first, first + ROWS_AT_ONCE)), matrix))
-    warnings = ["The scene was made for smoothed splats, which are drawn as plain ones here."]
-    return to_scene(
-        gathering, path.name, warnings if header.flags & _ANTIALIASED else [], logs=True, logits=False
-    )
+    model = ANTIALIASED if header.flags & _SMOOTHED else PLAIN
+    scene = to_scene(gathering, path.name, [], logs=True, logits=False, model=model)
+    return scene.with_record(warnings=(*scene.record.warnings, *_of_axes(scene.gaussians, named, axes)))
 
 
-def write_spz(scene: Scene, path: Path, *, version: int | None = None) -> None:
+def write_spz(scene: Scene, path: Path, *, version: int | None = None, axes: str | None = None) -> None:
     """The Gaussians of a scene, in its own order.
 
     Args:
         version: 2 to 4; None: 4 where zstd is at hand, else 3.
+        axes: of `formats.AXES`, which the file then names; None: the format's own, which it does not.
 
     Raises:
         OutputError: nothing to write, a Gaussian too far away for the format, no zstd for version 4, or
@@ -110,16 +117,18 @@ def write_spz(scene: Scene, path: Path, *, version: int | None = None) -> None:
     check_some(scene.gaussians, path)
     if version is None:
         version = 4 if has_zstd() else 3
-    header, streams = _encoded(scene.gaussians, version, path.name)
-    fields = (header.version, header.count, header.degree, header.bits, header.flags)
+    header, streams = _encoded(scene.gaussians, version, path.name, axes or _STORED_AXES)
+    extensions = struct.pack("<III", _AXES_EXTENSION, 4, AXES.index(axes) + 1) if axes else b""
+    flags = (_SMOOTHED if scene.record.antialiased else 0) | (_EXTENDED if extensions else 0)
+    fields = (header.version, header.count, header.degree, header.bits, flags)
     if version < 4:
-        plain = _HEAD.pack(_MAGIC, *fields, 0) + b"".join(streams)
+        plain = _HEAD.pack(_MAGIC, *fields, 0) + b"".join(streams) + extensions
         return write_atomically(path, gzip.compress(plain, mtime=0))
     streams = [stream for stream in streams if stream]
     packed = [zstd_packed(stream) for stream in streams]
     table = b"".join(struct.pack("<QQ", len(p), len(s)) for p, s in zip(packed, streams, strict=True))
-    head = _HEAD.pack(_MAGIC, *fields, len(streams)) + struct.pack("<I12x", _ZSTD_HEAD)
-    write_atomically(path, [head, table, *packed])
+    head = _HEAD.pack(_MAGIC, *fields, len(streams)) + struct.pack("<I12x", _ZSTD_HEAD + len(extensions))
+    write_atomically(path, [head, extensions, table, *packed])
 
 
 def _unzipped(content: bytes, name: str) -> tuple[_Header, list[bytes], bytes]:
@@ -136,7 +145,9 @@ def _unzipped(content: bytes, name: str) -> tuple[_Header, list[bytes], bytes]:
         )
     needed = sum(header.sizes())
     _check_shrinking(needed, len(content), name)
-    after = 1 << 12 if header.flags & _EXTENDED else 1  # asked for, so that an end that is missing shows
+    after = (
+        _MOST_EXTENSIONS if header.flags & _EXTENDED else 1
+    )  # asked for, so that an end that is missing shows
     plain = inflated(content, _HEAD.size + needed + after, name, wbits=31)
     if len(plain) < _HEAD.size + needed:
         raise SceneFileError(
@@ -202,16 +213,32 @@ def _check_shrinking(needed: int, found: int, name: str) -> None:
         )
 
 
-def _axes(extensions: bytes) -> str:
-    """The axes that the records of an extension area name, or the format's own."""
+def _named_axes(extensions: bytes, name: str) -> str | None:
+    """The axes that the records of an extension area name.
+
+    Raises:
+        SceneFileError: they are none that are known, or the records go on beyond what is there.
+    """
     start = 0
     while start + 8 <= len(extensions):
         kind, size = struct.unpack_from("<II", extensions, start)
         value = extensions[start + 8 : start + 8 + size]
-        if kind == _AXES_EXTENSION and size == 4 and 1 <= int.from_bytes(value, "little") <= 16:
-            return _NAMED_AXES[int.from_bytes(value, "little") - 1]
+        if len(value) < size:
+            raise SceneFileError(f"{name} has an extension {kind:#x} of {size:,} bytes, cut off; {_REMEDY}")
+        number = int.from_bytes(value[:4], "little")
+        if kind == _AXES_EXTENSION and (size != 4 or number > len(AXES)):
+            raise SceneFileError(f"{name} names axes {number}, this program knows 1 to 16; {_REMEDY}")
+        if kind == _AXES_EXTENSION and number:  # 0: unspecified
+            return AXES[number - 1]
         start += 8 + size
-    return _STORED_AXES
+    return None
+
+
+def _of_axes(gaussians: Gaussians, named: str | None, told: str | None) -> list[str]:
+    """What is to be said of the axes that a file was read by."""
+    if named and told and named != told:
+        return [f"The file names its own axes, {named}, and was read by those, not by {told}."]
+    return [_ON_ITS_HEAD] if not named and not told and on_its_head(gaussians) else []
 
 
 def _rows(header: _Header, streams: list[bytes], some: slice) -> Rows:
@@ -254,7 +281,7 @@ def _signed_three(stored: np.ndarray) -> np.ndarray:
     return xyzw[:, [3, 0, 1, 2]]
 
 
-def _encoded(gaussians: Gaussians, version: int, name: str) -> tuple[_Header, list[bytes]]:
+def _encoded(gaussians: Gaussians, version: int, name: str, axes: str) -> tuple[_Header, list[bytes]]:
     """Header and attribute streams.
 
     Raises:
@@ -269,7 +296,7 @@ def _encoded(gaussians: Gaussians, version: int, name: str) -> tuple[_Header, li
     bits = next(b for b in range(_MOST_BITS, -1, -1) if round(furthest * (1 << b)) < 1 << 23 or not b)
     degree = min(int(gaussians.sh.shape[1] ** 0.5) - 1, MAX_SHOWN_DEGREE)
     header = _Header(version, len(gaussians), degree, bits, 0, 0)
-    matrix, columns = axes_matrix(_STORED_AXES), []
+    matrix, columns = axes_matrix(axes), []
     for part in parts(gaussians):
         columns.append(_columns(turned(part, matrix), version, bits))
     return header, [b"".join(pieces) for pieces in zip(*columns, strict=True)]

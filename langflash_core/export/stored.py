@@ -20,6 +20,8 @@ from langflash_core.types import Gaussians, Scene
 ROWS_AT_ONCE = 1 << 16  # 16 MB of a file with spherical harmonics of degree 3
 _SMALLEST, _LARGEST = 1e-30, 1e30  # of scales: beyond, float32 products vanish or overflow
 _COPIES = 2  # of all numbers, at most, while a file is opened: 10 million took 1.0 GB for 0.56 of their own
+PLAIN, ANTIALIASED, FLAT = "default", "antialiased", "2dgs"
+"""What splats were trained as, in the words of SOG."""
 _OPAQUE = 1 - 1e-7  # its logit, 16.1, is the largest that is written: infinity breaks other readers
 
 
@@ -97,11 +99,20 @@ def _check_memory(most: int, num_bases: int, name: str) -> None:
         )
 
 
-def to_scene(gathering: Gathering, name: str, warnings: list[str], *, logs: bool, logits: bool) -> Scene:
+def to_scene(
+    gathering: Gathering,
+    name: str,
+    warnings: list[str],
+    *,
+    logs: bool,
+    logits: bool,
+    model: str = PLAIN,
+) -> Scene:
     """The scene of gathered rows, activated in place.
 
     Args:
-        name: of the file. logs, logits: scales and opacities are stored that way.
+        name: of the file. logs, logits: scales and opacities are stored that way. model: `PLAIN`,
+            `ANTIALIASED`, or what else the file says that its splats are; it is said where it is not plain.
 
     Raises:
         SceneFileError: no Gaussian is usable.
@@ -127,7 +138,16 @@ def to_scene(gathering: Gathering, name: str, warnings: list[str], *, logs: bool
         opacities=opacities.clamp_(0, 1),
         sh=torch.from_numpy(rows.sh),
     )
-    return bare_scene(gaussians, name, tuple(warnings))
+    if model != PLAIN:
+        warnings = [*warnings, _said_of(model)]
+    scene = bare_scene(gaussians, name, tuple(warnings))
+    return scene.with_record(antialiased=model == ANTIALIASED)
+
+
+def _said_of(model: str) -> str:
+    kinds = {ANTIALIASED: "smoothed splats", FLAT: "flat splats (2DGS)"}
+    made = kinds.get(model, f"splats of a kind that is not known here ({model[:40]})")
+    return f"The scene was made for {made}, which are drawn as plain ones here."
 
 
 def parts(gaussians: Gaussians) -> Iterator[Rows]:

@@ -5,6 +5,9 @@ opacities in [0, 1]; harmonics have all bases of a Gaussian together. A unit is 
 the scene knows, else one. Stages in half precision, Z up,
 and under transformed parents are read too.
 
+Colours are sRGB values, and said to be (UsdColorSpaceAPI), for what says nothing may be taken for linear.
+Stages that name linear ones are converted; those that name none are taken for sRGB, as trainers leave them.
+
 Source: OpenUSD 26.03 and later, the schemas of usdVol (generatedSchema.usda).
 """
 
@@ -16,6 +19,7 @@ import numpy as np
 
 from langflash_core.apart import Ended, Part, Refused, ask
 from langflash_core.errors import OutputError, SceneFileError
+from langflash_core.export.colours import Encoding, encoding_of, with_srgb_colours
 from langflash_core.export.packing import check_some, placed, told, turned
 from langflash_core.export.stored import ROWS_AT_ONCE, Gathering, Rows, parts, to_scene
 from langflash_core.files import written_atomically
@@ -27,6 +31,7 @@ _AXES = {"Y": "RUB", "Z": "RFU"}  # by a stage's upAxis
 # The attributes that `langflash_core/apart/stages.py` reads, which imports OpenUSD.
 ARRAYS = ("positions", "orientations", "scales", "opacities")
 HARMONICS = "radiance:sphericalHarmonicsCoefficients"
+_SPACE = "srgb_rec709_scene"  # OpenUSD's own name of sRGB; it knows none of a display
 _KIND = "ParticleField3DGaussianSplat"
 _ABSENT = "OpenUSD is not installed; pip install 'langflash[usd]'"
 _REMEDY = "export it again, or name a .ply"
@@ -44,7 +49,7 @@ def read_usd(path: Path) -> Scene:
     if not path.stat().st_size:
         raise SceneFileError(f"{path.name} is an empty file; {_REMEDY}")
     try:
-        prims = [_prim(part) for part in ask("stage", {"path": str(path.absolute())})]
+        prims = [_prim(part, path.name) for part in ask("stage", {"path": str(path.absolute())})]
         if not prims:
             raise SceneFileError(f"{path.name} holds no Gaussians (no {_KIND}); {_REMEDY}")
         gathering = _gathered(prims, path.name)
@@ -52,7 +57,8 @@ def read_usd(path: Path) -> Scene:
         raise SceneFileError(f"{path.name} cannot be read: OpenUSD {error}; {_REMEDY}") from error
     except (Refused, ValueError, TypeError, KeyError) as error:
         raise SceneFileError(f"{path.name} is damaged or no USD ({told(error)}); {_REMEDY}") from error
-    return to_scene(gathering, path.name, [], logs=False, logits=False)
+    said = dict.fromkeys(encoding.said for *_, encoding in prims if encoding.said)
+    return to_scene(gathering, path.name, list(said), logs=False, logits=False)
 
 
 def write_usd(scene: Scene, path: Path) -> None:
@@ -107,8 +113,11 @@ def _pxr():
     )
 
 
-def _prim(part: Part) -> tuple[Rows, np.ndarray, str]:
-    """A prim's arrays in its own axes, where it stands (4, 4), and the stage's axes.
+_Prim = tuple[Rows, np.ndarray, str, Encoding]
+
+
+def _prim(part: Part, name: str) -> _Prim:
+    """A prim's arrays in its own axes, where it stands (4, 4), the stage's axes, and how colours are encoded.
 
     Raises:
         ValueError, TypeError, KeyError: their lengths disagree, or the stage's axis is none.
@@ -121,15 +130,18 @@ def _prim(part: Part) -> tuple[Rows, np.ndarray, str]:
     sh = flat.reshape(count, bases, 3)[:, : (MAX_SHOWN_DEGREE + 1) ** 2]
     # OpenUSD hands quaternions over as xyzw.
     rows = Rows(means, quats[:, [3, 0, 1, 2]], scales, opacities[:, 0], np.ascontiguousarray(sh))
-    return rows, np.array(part.facts["place"], np.float64).reshape(4, 4), _AXES[part.facts["up"]]
+    place = np.array(part.facts["place"], np.float64).reshape(4, 4)
+    return rows, place, _AXES[part.facts["up"]], encoding_of(str(part.facts["space"]), name)
 
 
-def _gathered(prims: list[tuple[Rows, np.ndarray, str]], name: str) -> Gathering:
-    num_bases = max(rows.sh.shape[1] for rows, _, _ in prims)
-    gathering = Gathering(sum(len(rows.means) for rows, _, _ in prims), num_bases, name)
-    for rows, place, axes in prims:
+@np.errstate(all="ignore")  # numbers that are not finite are left out, and said
+def _gathered(prims: list[_Prim], name: str) -> Gathering:
+    num_bases = max(rows.sh.shape[1] for rows, *_ in prims)
+    gathering = Gathering(sum(len(rows.means) for rows, *_ in prims), num_bases, name)
+    for rows, place, axes, encoding in prims:
         for first in range(0, len(rows.means), ROWS_AT_ONCE):
             some = Rows(*(values[first : first + ROWS_AT_ONCE] for values in rows.all()))
+            some = with_srgb_colours(some) if encoding.linear else some
             gathering.add(_padded(placed(some, place, axes), num_bases))
     return gathering
 
@@ -154,6 +166,7 @@ def _write_stage(scene: Scene, path: Path, pxr) -> None:
     pxr.UsdGeom.SetStageMetersPerUnit(stage, scene.record.metric_scale or 1.0)
     field = pxr.UsdVol.ParticleField3DGaussianSplat.Define(stage, "/Splats")
     stage.SetDefaultPrim(field.GetPrim())
+    pxr.Usd.ColorSpaceAPI.Apply(field.GetPrim()).CreateColorSpaceNameAttr(_SPACE)
     arrays = pxr.Vt
     field.GetPositionsAttr().Set(arrays.Vec3fArray.FromNumpy(means))
     field.GetOrientationsAttr().Set(arrays.QuatfArray.FromNumpy(np.ascontiguousarray(quats[:, [1, 2, 3, 0]])))

@@ -93,6 +93,45 @@ def invert_rigid(matrices: Float[Tensor, "*n 4 4"]) -> Float[Tensor, "*n 4 4"]:
     return inverse
 
 
+_UPRIGHT = {
+    1: ((1, 0), (0, 1)),
+    2: ((-1, 0), (0, 1)),
+    3: ((-1, 0), (0, -1)),
+    4: ((1, 0), (0, -1)),
+    5: ((0, 1), (1, 0)),
+    6: ((0, -1), (1, 0)),
+    7: ((0, -1), (-1, 0)),
+    8: ((0, 1), (-1, 0)),
+}
+"""Where EXIF's orientations bring right and down of the stored pixels."""
+MIRRORED = (2, 4, 5, 7)
+"""Those of photos that are stored mirrored."""
+
+
+def turned_camera(
+    K: Float[Tensor, "3 3"], viewmat: Float[Tensor, "4 4"], size: tuple[int, int], orientation: int
+) -> tuple[Float[Tensor, "3 3"], Float[Tensor, "4 4"], tuple[int, int]]:
+    """The camera of a photo's stored pixels as that of the photo turned upright: the same rays.
+
+    Args:
+        K, size: pixels, (width, height), as stored. orientation: EXIF's, 1 to 8.
+
+    Raises:
+        ValueError: a mirrored photo (2, 4, 5, 7), of which no camera takes the same rays.
+    """
+    turn = torch.tensor(_UPRIGHT[orientation], dtype=K.dtype)
+    if torch.linalg.det(turn) < 0:
+        raise ValueError(f"orientation: expected 1, 3, 6 or 8, received {orientation}, which mirrors")
+    to_upright, camera = torch.eye(3, dtype=K.dtype), torch.eye(4, dtype=viewmat.dtype)
+    to_upright[:2, :2] = turn
+    to_upright[:2, 2] = -turn.clamp(max=0) @ torch.tensor(size, dtype=K.dtype)
+    camera[:2, :2] = turn
+    upright = to_upright @ K
+    upright[:, :2] = upright[:, :2] @ turn.T
+    width, height = size
+    return upright, camera @ viewmat, (height, width) if orientation >= 5 else (width, height)
+
+
 def rotation_angle_degrees(
     left: Float[Tensor, "... 3 3"], right: Float[Tensor, "... 3 3"]
 ) -> Float[Tensor, "..."]:

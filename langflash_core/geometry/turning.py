@@ -20,9 +20,9 @@ _AXIS = {**dict.fromkeys("RL", 0), **dict.fromkeys("DU", 1), **dict.fromkeys("FB
 
 
 def axes_matrix(letters: str) -> Float[Tensor, "3 3"]:
-    """M (3, 3) float64 from right-down-forward, the axes of a `Scene`, to those named."""
+    """M (3, 3) float64 from right-down-forward, the axes of a `Scene`, to those named, in either case."""
     matrix = torch.zeros(3, 3, dtype=torch.float64)
-    for row, letter in enumerate(letters):
+    for row, letter in enumerate(letters.upper()):
         matrix[row, _AXIS[letter]] = _SIGNS[letter]
     return matrix
 

@@ -36,10 +36,11 @@ class Film:
 
 
 class Reader:
-    """An open film; see `opened`."""
+    """An open film; see `opened`. doubtful: pictures given so far that came equal to the last bit, as none of
+    a camera are, from the only decoder that there is: it may not know the film's kind."""
 
     def __init__(self, path: Path, film: Film) -> None:
-        self._path, self.film = path, film
+        self._path, self.film, self.doubtful = path, film, 0
 
     def pictures(
         self, start: float, end: float | None, check: Callable[[], None]
@@ -58,6 +59,7 @@ class Reader:
             for part in parts:
                 check()
                 if "picture" in part.arrays:
+                    self.doubtful += bool(part.facts["doubtful"])
                     yield float(part.facts["seconds"]), part.arrays["picture"]
 
 

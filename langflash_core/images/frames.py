@@ -7,6 +7,7 @@ files. Of a film that was looked at before nothing is decoded again.
 import hashlib
 import json
 import os
+import shlex
 import shutil
 import time
 from collections.abc import Callable
@@ -59,6 +60,7 @@ STILL_SIDE, QUALITY = 1920, 92  # pixels of the longer side of a kept frame, at 
 DARK = 0.08  # a frame whose brightest tenth stays below
 KEPT_FILMS = 8  # of which stills are kept
 STAGE = "film"
+_EQUAL = "comes as equal pictures from the decoder, as interlaced films do"
 _UNSEEN = 0.3  # of the side that the film is taken to have moved where it was lost in a fast turn
 _NO_GREY = np.zeros((1, 1), np.uint8)  # where no length is asked for
 _MOST_SHOTS, _COMPARED = 12, 3  # shots that are compared with each other, stills of each
@@ -345,6 +347,8 @@ class _Watch:
             )
         if self._looked == 1:
             raise FilmError(f"{name} is a single picture; film for some seconds, or use photos")
+        if self._reader.doubtful > self._looked / 2:
+            raise FilmError(f"{name} {_EQUAL}; {_apart(name)}")
         if self._dark > self._looked / 2 and len(self._stills) < 2:
             raise FilmError(f"{name} is too dark to see anything; film again with more light")
         if not self._stills or self._plain > 0.9 * self._looked:
@@ -406,6 +410,9 @@ class _Watch:
                 f"{name} ends after {last:.1f} of {missed:.1f} seconds, what follows cannot be decoded; "
                 "copy the film again"
             )
+        if self._reader.doubtful:
+            part = f"{self._reader.doubtful / self._looked:.0%}"
+            notes.append(f"{part} of {name} {_EQUAL}; {_apart(name)}")
         if shots > 1:
             kept = [still for still in self._stills if still.why_not != ELSEWHERE]
             notes.append(
@@ -413,6 +420,14 @@ class _Watch:
                 f"{kept[0].seconds:.1f} to {kept[-1].seconds:.1f} s; --from and --to tell another"
             )
         return tuple(notes)
+
+
+def _apart(name: str) -> str:
+    """How to get a film read that OpenCV does not decode."""
+    return (
+        "pip install 'langflash[video]' brings a decoder for it, or convert it first: "
+        f"ffmpeg -i {shlex.quote(name)} -vf yadif converted.mp4"
+    )
 
 
 def _bare(name: str) -> FilmError:

@@ -14,6 +14,8 @@ from langflash_core.geometry.cameras import intrinsics_from_fov
 from langflash_core.images.decode import PhotoFacts
 from langflash_core.types import Lenses
 
+Intrinsics = tuple[float, float, float, float]
+"""fx, fy, cx, cy."""
 ASSUMED_FOV = 65.0  # degrees on the longer side: a phone's main camera (24-28 mm equivalent)
 PLAUSIBLE_FOV = (5.0, 150.0)  # degrees; EXIF that says otherwise is wrong
 FILM_DIAGONAL = math.hypot(36.0, 24.0)  # mm
@@ -78,7 +80,7 @@ def photo_intrinsics(
 def known_lenses(
     photos: Sequence[PhotoFacts],
     fovs: Sequence[float | None],
-    intrinsics: tuple[float, ...] | None,
+    intrinsics: Intrinsics | Sequence[Intrinsics] | None,
     note: str,
 ) -> Lenses | None:
     """What is known of the photos' lenses; None where all are given.

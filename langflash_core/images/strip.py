@@ -17,7 +17,7 @@ from jaxtyping import Bool, Float, Int
 from langflash_core.errors import FilmError
 from langflash_core.images.pictures import FILM_PHOTOS
 
-FORMAT = 2
+FORMAT = 3
 INDEX = "strip.json"
 SPACING = 0.05  # of the side, the root of a picture's area, from one chosen frame to the next
 NARROWEST, WIDEST = 0.4, 0.35  # of the spacing; of the side: nearly half of a picture may then be new

@@ -2,6 +2,7 @@
 
 from collections.abc import Callable, Sequence
 from pathlib import Path
+from typing import cast
 
 import numpy as np
 import torch
@@ -10,7 +11,7 @@ from torch import Tensor
 from langflash_core.errors import InputError
 from langflash_core.images import triage
 from langflash_core.images.decode import PhotoFacts
-from langflash_core.images.lens import ASSUMED_FOV, check_lens, known_lenses, photo_intrinsics
+from langflash_core.images.lens import ASSUMED_FOV, Intrinsics, check_lens, known_lenses, photo_intrinsics
 from langflash_core.images.pictures import Box, Picture, photo_names, photo_paths, read_pictures
 from langflash_core.picture_files import STORED, opened_picture
 from langflash_core.types import Views
@@ -20,7 +21,7 @@ def load_views(
     photos: Sequence[Path | str],
     *,
     fov: float | Sequence[float | None] | None = None,
-    intrinsics: tuple[float, float, float, float] | None = None,
+    intrinsics: Intrinsics | Sequence[Intrinsics] | None = None,
     area: int = 224 * 224,
     multiple: int = 14,
     square: bool = False,
@@ -33,7 +34,7 @@ def load_views(
         photos, area, multiple, square, check: as `read_pictures`.
         fov: degrees of each photo's longer side, one for all or one per photo; None: EXIF, else
             65 with a note.
-        intrinsics: (fx, fy, cx, cy) in pixels of the upright photos, the same for all.
+        intrinsics: (fx, fy, cx, cy) in pixels of the upright photos, the same for all or one per photo.
         pictures: gives what `read_pictures` makes of these photos, begun earlier.
 
     Returns:
@@ -45,8 +46,9 @@ def load_views(
     """
     paths = photo_paths(photos)
     fovs = _fovs(fov, len(paths))
-    for each in dict.fromkeys(fovs):
-        check_lens(each, intrinsics)
+    lenses_given = _lenses_given(intrinsics, len(paths))
+    for each in dict.fromkeys(zip(fovs, lenses_given, strict=True)):
+        check_lens(*each)
     names = photo_names(paths)
     if pictures is None:
         read = read_pictures(paths, area=area, multiple=multiple, square=square, check=check)
@@ -54,12 +56,12 @@ def load_views(
         read = pictures()
     images = [_image(picture) for picture in read]
     Ks, notes, assumed = [], [], []
-    for picture, name, own_fov, image in zip(read, names, fovs, images, strict=True):
+    for picture, name, own_fov, given, image in zip(read, names, fovs, lenses_given, images, strict=True):
         check()
         photo, box = picture.photo, picture.box
-        if intrinsics is not None:
+        if given is intrinsics is not None:
             _check_same_size(photo, read[0].photo)
-        K, guessed = photo_intrinsics(photo, own_fov, intrinsics)
+        K, guessed = photo_intrinsics(photo, own_fov, given)
         Ks.append(cropped_intrinsics(K, box, picture.size))
         notes += triage.photo_notes(photo, image, picture.grey)
         notes += triage.crop_notes(photo, None if square else box, names[0])
@@ -116,6 +118,19 @@ def _fovs(fov: float | Sequence[float | None] | None, count: int) -> list[float 
     if len(fov) != count:
         raise InputError(f"{len(fov)} fields of view were given for {count} photos; give one each, or one")
     return list(fov)
+
+
+def _lenses_given(
+    intrinsics: Intrinsics | Sequence[Intrinsics] | None, count: int
+) -> list[Intrinsics] | list[None]:
+    """One per photo."""
+    if intrinsics is None:
+        return [None] * count
+    if not intrinsics or isinstance(intrinsics[0], int | float):
+        return [cast(Intrinsics, intrinsics)] * count
+    if len(intrinsics) != count:
+        raise InputError(f"{len(intrinsics)} intrinsics were given for {count} photos; give one each, or one")
+    return cast(list[Intrinsics], list(intrinsics))
 
 
 def _check_same_size(photo: PhotoFacts, first: PhotoFacts) -> None:

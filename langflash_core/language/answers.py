@@ -4,6 +4,7 @@ A phrase is present where its best pixels pass the threshold, not where it is le
 """
 
 import math
+from dataclasses import replace
 
 import torch
 from jaxtyping import Bool, Float
@@ -59,6 +60,8 @@ def answer(
         _one(text, float(score), limit, mask, points[mask], values[mask])
         for text, score, mask, values in zip(compiled.texts, scores, masks, relevance, strict=True)
     )
+    if compiled.notes:
+        answers = tuple(replace(one, note=note) for one, note in zip(answers, compiled.notes, strict=True))
     return QueryResult(answers, compiled.mode, relevance, masks, frame, camera)
 
 

@@ -9,7 +9,6 @@ Source: Reimers and Gurevych 2019 (Sentence-BERT); Wang et al. 2020 (MiniLM); we
 checks in assets/licences/minilm_l6_v2.md. Twin: `bert_twin`, tests/language/reference.py (NumPy, float64).
 """
 
-import re
 from collections.abc import Sequence
 from functools import lru_cache
 from pathlib import Path
@@ -23,7 +22,6 @@ from torch import Tensor, nn
 from torch.nn.functional import normalize
 
 from langflash_core.errors import PromptError, WeightsError
-from langflash_core.language.vocabulary import all_phrases
 from langflash_core.resources import asset_path
 from langflash_core.shipped import check_shipped
 
@@ -123,27 +121,6 @@ def load_minilm() -> MiniLM:
         WeightsError: its files are missing or damaged.
     """
     return read_minilm(*shipped_files())
-
-
-def reads_foreign(text: str) -> bool:
-    """Whether a phrase has words, and none that the text model's vocabulary and the table of household words
-    hold: one in another language, or a rare one. The model was made of English.
-
-    Word pieces do not count: every word has those; nor do short words beside longer ones, articles among
-    them. Of 14 German, French, Spanish and Italian words for furniture that English does not have, all are
-    told.
-    """
-    words = re.findall(r"[^\W\d_]{4,}", text.lower()) or re.findall(r"[^\W\d_]{3}", text.lower())
-    known = load_minilm().tokenizer.token_to_id
-    ours = _household_words()
-    return bool(words) and not any(
-        known(word) is not None or word in ours or word.removesuffix("s") in ours for word in words
-    )
-
-
-@lru_cache(maxsize=1)
-def _household_words() -> frozenset[str]:
-    return frozenset(word for phrase in all_phrases() for word in phrase.lower().split())
 
 
 def shipped_files() -> tuple[Path, Path]:

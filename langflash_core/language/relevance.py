@@ -18,6 +18,7 @@ from torch import Tensor
 
 from langflash_core.errors import PromptError, SceneFileError
 from langflash_core.language.algebra import encode_prompts
+from langflash_core.language.hints import hints
 from langflash_core.language.spaces import LanguageSpace, encode_cached
 from langflash_core.language.taught import taught_dictionary
 from langflash_core.types import Scene, Semantics
@@ -37,7 +38,7 @@ class CompiledQuery:
 
     factor: R (K, r). prompts: Q t (P, r). negatives: Q n (M, r), M = 0 in cosine mode.
     temperature > 0. threshold: from which relevance a phrase counts as present. texts,
-    negative_texts: the phrases.
+    negative_texts: the phrases. notes: what people should know of each, or "" (`hints.py`).
     """
 
     factor: Float[Tensor, "K r"]
@@ -48,6 +49,7 @@ class CompiledQuery:
     mode: Mode
     texts: tuple[str, ...]
     negative_texts: tuple[str, ...] = ()
+    notes: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -150,6 +152,7 @@ def compile_query(
         mode=mode,
         texts=texts,
         negative_texts=against,
+        notes=hints(scene, texts),
     )
 
 

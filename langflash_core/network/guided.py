@@ -399,7 +399,8 @@ def _geometry(
     """What is handed over, with the lenses that were found."""
     found = () if views.lenses is None else views.lenses.found(poses.lenses)
     depths, confidences = maps.depths, maps.confidences
-    return Geometry(gaussians, viewmats, depths, confidences, poses.guessed, Ks.cpu(), found)
+    notes = (poses.doubt,) if poses.doubt else ()
+    return Geometry(gaussians, viewmats, depths, confidences, poses.guessed, Ks.cpu(), found, notes)
 
 
 def _sought(views: Views) -> Sought | None:

@@ -37,6 +37,7 @@ class Geometry:
     unplaced: tuple[int, ...]
     Ks: Float[Tensor, "V 3 3"] | None = None
     lenses: tuple[FoundLens, ...] = ()
+    warnings: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True)
@@ -294,7 +295,11 @@ class LangFlashNet(nn.Module):
                 depths=geometry.depths,
                 confidences=geometry.confidences,
                 unplaced=geometry.unplaced,
-                warnings=(*(_left_out(views.names[v]) for v in geometry.unplaced), *notes),
+                warnings=(
+                    *geometry.warnings,
+                    *(_left_out(views.names[v]) for v in geometry.unplaced),
+                    *notes,
+                ),
                 timings=dict(timings),
                 Ks=geometry.Ks,
                 lenses=geometry.lenses,

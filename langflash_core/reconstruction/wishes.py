@@ -10,6 +10,7 @@ from torch import Tensor
 
 from langflash_core.detail import DEFAULT_DETAIL, check_gaussians, chosen_detail
 from langflash_core.errors import InputError
+from langflash_core.images.lens import Intrinsics
 
 LONGEST_REFINEMENT = 3600  # seconds
 
@@ -22,7 +23,7 @@ class Wishes:
     preset: str = "mini"
     weights: Path | str | None = None
     fov: float | Sequence[float | None] | None = None
-    intrinsics: tuple[float, float, float, float] | None = None
+    intrinsics: Intrinsics | Sequence[Intrinsics] | None = None
     size: int | None = None
     device: str = "auto"
     precision: str = "auto"

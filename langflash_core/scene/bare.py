@@ -65,15 +65,22 @@ def framing_camera(gaussians: Gaussians) -> Camera:
 
 def _from_origin(means: Tensor) -> Camera | None:
     """The first photo's camera, where all lies ahead of it; None where it does not."""
+    if not in_one_cone(means):
+        return None
     ahead = means[:, 2] > 0
     slopes = means[:, :2].abs() / means[:, 2:].clamp_min(1e-12)  # (n, 2)
-    if float((ahead & (slopes < _CONE).all(-1)).double().mean()) < _IN_CONE:
-        return None
     width, height = VIEW_SIZE
     across, down = (_at_share(slope[ahead], _SHOWN) for slope in slopes.unbind(-1))
     widest = max(across, down * width / height, math.tan(math.radians(15)))
     fov = 2 * math.degrees(math.atan(widest))
     return Camera(torch.eye(4), intrinsics_from_fov(fov, width, height), width, height)
+
+
+def in_one_cone(means: Tensor) -> bool:
+    """Whether nearly all of means (n, 3) lie ahead of the origin, along +z, as what photos there predict."""
+    slopes = means[:, :2].abs() / means[:, 2:].clamp_min(1e-12)
+    inside = (means[:, 2] > 0) & (slopes < _CONE).all(-1)
+    return float(inside.double().mean()) >= _IN_CONE
 
 
 def _from_outside(means: Tensor, width: float) -> Camera:

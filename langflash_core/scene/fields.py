@@ -74,9 +74,12 @@ def from_fields(
         ValueError: a field is missing, unknown, or of another type.
     """
     missing = [name for name in REQUIRED if name not in fields]
-    photos = sorted(name for name in fields if name not in (*REQUIRED, *_OPTIONAL))
-    if missing or photos != [_PHOTO.format(view) for view in range(len(photos))]:
-        raise ValueError(f"fields: expected {', '.join(REQUIRED)} and photos, received {', '.join(fields)}")
+    others = [name for name in fields if name not in (*REQUIRED, *_OPTIONAL)]
+    photos = [_PHOTO.format(view) for view in range(len(others))]
+    strange = [name for name in others if name not in photos]
+    if missing or strange:
+        found = [f"no {name}" for name in missing] + [f"{name}, which is not known" for name in strange]
+        raise ValueError(f"fields: expected {', '.join(REQUIRED)} and photos, found {', '.join(found[:3])}")
     for name, values in fields.items():
         expected = {_DTYPES[name]} if name in _DTYPES else {torch.uint8}
         if name in ("weight_ids", _VIEW_IDS):

@@ -35,7 +35,8 @@ def joined(
     Rows and atoms of the first keep their numbers; those of the second follow, its names with them.
     Features stay as they are: f_i = sum_k w_ik d_k with the same w_ik and d_k. The second comes in
     the first's unit where both know theirs in metres. Views, photos and the rest of the record are the
-    first's: cameras of the second would look at what is somewhere else now. Where one alone has levels, or
+    first's: cameras of the second would look at what is somewhere else now. They are antialiased where both
+    are. Where one alone has levels, or
     confidences, all of the other is coarse, so that it is there in every picture, and sure.
 
     Args:
@@ -65,6 +66,7 @@ def joined(
         atom_names={**ours.atom_names, **{k + after: name for k, name in theirs.atom_names.items()}},
         atom_denials={**ours.atom_denials, **{k + after: words for k, words in theirs.atom_denials.items()}},
         silent_atoms=(*ours.silent_atoms, *(k + after for k in theirs.silent_atoms)),
+        antialiased=ours.antialiased and theirs.antialiased,
         lone_atoms=(*ours.lone_atoms, *(k + after for k in theirs.lone_atoms)),
     )
 

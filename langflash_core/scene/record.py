@@ -5,7 +5,9 @@ from run to run, and equal photos are to give equal files. Keys that this versio
 read into `Record.others` and written back as they are.
 """
 
-from langflash_core.records import Cost, Record, world_from_json, world_to_json
+import math
+
+from langflash_core.records import Cost, Record, Shift, world_from_json, world_to_json
 from langflash_core.scene.tour import read_tour, told_tour
 
 _COST = ("timings", "seconds", "peak_memory_mb")
@@ -28,10 +30,12 @@ def to_json(record: Record) -> dict:
     known["atom_denials"] = {str(k): list(said) for k, said in record.atom_denials.items()}
     known["silent_atoms"] = record.silent_atoms
     known["lone_atoms"] = record.lone_atoms
+    known["shift"] = record.shift
     known["world"] = None if record.world is None else world_to_json(record.world)
     known["thing_names"] = dict(record.thing_names)
     known["camera_path"] = record.camera_path
     known["tour"] = record.tour
+    known["antialiased"] = record.antialiased or None
     known["edits"] = {"deleted": record.num_deleted} if record.num_deleted else None
     known["layered"] = record.layered or None
     written = {
@@ -56,7 +60,7 @@ def from_json(values: dict) -> Record:
     world, things = _of_type(values, "world", dict), _of_type(values, "thing_names", dict) or {}
     ours = {
         *known, "atom_names", "atom_denials", "silent_atoms", "lone_atoms", "edits", "camera_path", "tour",
-        "world", "thing_names", "layered", _VERSION_1, *_COST,
+        "world", "thing_names", "shift", "antialiased", "layered", _VERSION_1, *_COST,
     }  # fmt: skip
     return Record(
         **{name: value for name, value in known.items() if value is not None},
@@ -65,9 +69,11 @@ def from_json(values: dict) -> Record:
         silent_atoms=tuple(_list(values, "silent_atoms", int)),
         lone_atoms=tuple(_list(values, "lone_atoms", int)),
         world=None if world is None else world_from_json(world),
+        shift=_shift(values),
         thing_names={str(thing): str(name) for thing, name in things.items()},
         camera_path=tuple(_list(values, "camera_path", dict)),
         tour=told_tour(read_tour(_of_type(values, "tour", dict) or {})),
+        antialiased=_flag(values, "antialiased"),
         num_deleted=int(_of_type(edits, "deleted", int) or 0),
         layered=_flag(values, "layered"),
         cost=Cost(
@@ -84,6 +90,16 @@ def counts_per_view(values: dict) -> list[int]:
     return _list(values, _VERSION_1, int)
 
 
+def _shift(values: dict) -> Shift | None:
+    found = _of_type(values, "shift", list)
+    if found is None:
+        return None
+    if len(found) != 3 or not all(type(value) in (int, float) and math.isfinite(value) for value in found):
+        raise ValueError(f"shift: expected three finite numbers, received {found!r}")
+    x, y, z = map(float, found)
+    return x, y, z
+
+
 def _of_type(values: dict, name: str, *types: type):
     """A value of one of these types, or None where there is none."""
     value = values.get(name)
@@ -95,9 +111,9 @@ def _of_type(values: dict, name: str, *types: type):
 
 def _flag(values: dict, name: str) -> bool:
     value = values.get(name, False)
-    if not isinstance(value, bool):
-        raise ValueError(f"{name}: expected true or false, received {value!r}")
-    return value
+    if isinstance(value, bool):
+        return value
+    raise ValueError(f"{name}: expected true or false, received {value!r}")
 
 
 def _list(values: dict, name: str, kind: type) -> list:

@@ -25,12 +25,13 @@ def describe(scene: "Scene") -> dict:
 
     Returns:
         `gaussians, atoms, channels, weights_per_gaussian (mean), sh_degree, views, view_size,
-        photos, preset, source (the splat file it came from, or None), space, bytes {field: bytes,
-        total}, bounding_box and core_box {min, max} in scene units (None when empty), metric_scale
-        (metres per unit or None), world (None, or as `Record` has it), counts, pruning (as `prune` left it,
-        with `psnr_db` and `relevance_error` where they were measured), refinement (None, or kept, held_out
-        and the PSNR before and after), detail (None, or as `Record` has it), light (None, or gains and
-        offsets, a row of red, green and blue per view), lens and left_out (None, or as `Record` has them),
+        photos, preset, source (the splat file it came from, or None), antialiased (trained to be drawn
+        so), space, bytes {field: bytes, total}, bounding_box and core_box {min, max} in scene units (None
+        when empty), metric_scale (metres per unit or None), world (None, or as `Record` has it), counts,
+        pruning (as `prune` left it, with `psnr_db` and `relevance_error` where they were measured),
+        refinement (None, or kept, held_out and the PSNR before and after), detail (None, or as `Record` has
+        it), light (None, or gains and offsets, a row of red, green and blue per view), lens and left_out
+        (None, or as `Record` has them),
         tour (None, or the names of stops, how many notes, and the start), timings {stage: seconds, total}
         (None where they are not known, as in files), warnings`.
     """
@@ -223,6 +224,7 @@ def _document(
         "photos": list(known.photos),
         "preset": known.preset,
         "source": known.source,
+        "antialiased": known.antialiased,
         "space": space,
         "bytes": {**sizes, "total": sum(sizes.values())},
         "bounding_box": _box(means, (0.0, 1.0)),

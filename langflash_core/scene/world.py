@@ -37,7 +37,8 @@ def placed(
 ) -> Scene:
     """The scene with every point p at unit turn (p - origin); its views look at the same things.
 
-    Key frames, stops and notes go along: they are places of the scene, too.
+    Key frames, stops and notes go along: they are places of the scene, too. What was taken off a file's
+    coordinates is known no more: these have other axes.
     """
     matrix, start = torch.from_numpy(turn).double(), torch.from_numpy(origin).double()
     means = (unit * (scene.gaussians.means.double() - start) @ matrix.T).float()
@@ -49,6 +50,7 @@ def placed(
     path = tuple(_placed_key(key, turn, origin, unit) for key in scene.record.camera_path)
     tour = _placed_tour(scene.record.tour, turn, origin, unit)
     whole = replace(scene, gaussians=moved, viewmats=viewmats.float())
+    whole = whole if whole.record.shift is None else whole.with_record(shift=None)
     return whole.with_record(camera_path=path, tour=tour) if path or tour else whole
 
 

@@ -10,7 +10,8 @@ from pathlib import Path
 
 from langflash_core.files import check_folder, check_output_file, check_same_kind
 from langflash_core.formats import kind_of
-from langflash_core.outputs import ALL_OUT, Output, loaded
+from langflash_core.outputs import ALL_OUT, PLY, SCENE, Output, loaded
+from langflash_core.records import told_shift
 from langflash_core.request import ExportRequest
 from langflash_core.running import Progress
 from langflash_core.types import Scene
@@ -62,7 +63,17 @@ def write(
         LangFlashError: the request cannot be fulfilled, or nothing answers.
     """
     kind, choice = prepared(request)
-    return loaded(kind.writer)(Job(request, kind, scene, choice, renderers, progress))
+    said = loaded(kind.writer)(Job(request, kind, scene, choice, renderers, progress))
+    return said + _unshifted(scene, request, kind)
+
+
+def _unshifted(scene: Scene, request: ExportRequest, kind: Output) -> str:
+    """That a file's coordinates are the scene's, not those of the file far from 0 that it came from."""
+    places = kind.subject in ("scene", "photos") or kind.word in ("boxes", "surface")
+    kept = kind in (PLY, SCENE) and not request.upright
+    if scene.record.shift is None or kept or not places:
+        return ""
+    return f"; its coordinates lack the {told_shift(scene.record.shift)} that was taken off"
 
 
 def request_of_whole(path: Path, prompts: tuple[str, ...]) -> ExportRequest:

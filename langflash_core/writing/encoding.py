@@ -14,8 +14,13 @@ from pathlib import Path
 from langflash_core.errors import LangFlashError, OutputError
 from langflash_core.geometry.tours import RATE
 
-_H264 = ("libx264", "-pix_fmt", "yuv420p", "-crf", "10", "-preset", "veryfast")
-"""The preset takes half the encoder's time of the usual one; files grow a little."""
+_H264 = (
+    "libx264", "-pix_fmt", "yuv420p", "-crf", "10", "-preset", "veryfast",
+    "-vf", "scale=out_color_matrix=bt709:out_range=tv",
+    "-x264-params", "colorprim=bt709:transfer=iec61966-2-1:colormatrix=bt709:range=tv",
+)  # fmt: skip
+"""The preset takes half the encoder's time of the usual one; files grow a little. Pictures are sRGB, and the
+file says so: unsaid, ffmpeg writes the matrix of BT.601, and players take large films for BT.709's."""
 _WEBP = (
     "libwebp_anim", "-pix_fmt", "yuv420p", "-quality", "80", "-compression_level", "2", "-loop", "0",
 )  # fmt: skip

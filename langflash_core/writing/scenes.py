@@ -11,7 +11,7 @@ from langflash_core.files import make_folder
 from langflash_core.formats import SOG_FOLDER, kind_of
 from langflash_core.fused import fused
 from langflash_core.level import upright
-from langflash_core.outputs import PLY, loaded
+from langflash_core.outputs import GLB, OPEN_USD, PLY, SPLAT, loaded
 from langflash_core.scene.thin import coarse_level
 from langflash_core.types import Scene
 from langflash_core.writing.job import Job
@@ -24,19 +24,23 @@ def write_scene(job: Job) -> str:
         LangFlashError: nothing answers, or a file cannot be written.
     """
     scene, path = job.scene, job.request.output
-    chosen = _as_fine(job) if job.kind.subject == "photos" else fused(_as_fine(job))
+    chosen = _as_fine(job)
+    if job.kind is not SCENE and job.kind.subject != "photos":
+        chosen = fused(chosen)
     if job.prompts:
         chosen = pipeline.select(chosen, job.prompts, threshold=job.request.threshold)
     chosen = upright(chosen) if job.request.upright else chosen
     make_folder(path.parent)
-    loaded(job.kind.of_scene)(chosen, path)
+    axes = job.request.axes_of(path)
+    loaded(job.kind.of_scene)(chosen, path, **({"axes": axes} if axes else {}))
     if job.kind.subject == "photos":
         return f"{scene.num_views} photos in images/ and their poses"
     fewer = len(chosen.gaussians) < len(scene.gaussians)
     share = f" of {len(scene.gaussians):,}" if fewer or job.prompts else ""
     has_side_car = job.kind is PLY and chosen.semantics.num_atoms > 0
+    marked = f"; a {kind_of(path)} cannot say that they are to be smoothed" if _unmarked(job, chosen) else ""
     beside = f", its language in {side_car(path).name}" if has_side_car else ""
-    return f"{len(chosen.gaussians):,}{share} Gaussians, {_megabytes(path):.1f} MB{beside}"
+    return f"{len(chosen.gaussians):,}{share} Gaussians, {_megabytes(path):.1f} MB{beside}{marked}"
 
 
 def write_page(job: Job) -> str:
@@ -78,13 +82,17 @@ def _beside(job: Job) -> dict[str, Scene]:
             raise InputError(
                 f"two scenes are called {path.stem}; rename one, so that the page tells them apart"
             )
-        scenes[path.stem] = fused(_as_fine(job, read(path)))
+        scenes[path.stem] = fused(_as_fine(job, read(path, axes=job.request.axes_of(path))))
     return scenes
 
 
 def _as_fine(job: Job, scene: Scene | None = None) -> Scene:
     scene = job.scene if scene is None else scene
     return coarse_level(scene) if job.request.detail == "low" else scene
+
+
+def _unmarked(job: Job, scene: Scene) -> bool:
+    return scene.record.antialiased and job.kind in (SPLAT, GLB, OPEN_USD)
 
 
 def _megabytes(path: Path) -> float:

@@ -2,8 +2,7 @@
 
 import pytest
 
-from app.window.scene.drops import PHOTO_SUFFIXES as DROPPED
-from langflash_core.batch.sets import PHOTO_SUFFIXES, read_sets
+from langflash_core.batch.sets import read_sets
 from langflash_core.errors import InputError
 
 
@@ -68,7 +67,3 @@ def test_no_sets(tmp_path):
             read_sets(path, tmp_path / "out")
     with pytest.raises(InputError, match="choose another -o"):
         read_sets(tmp_path, tmp_path)
-
-
-def test_photos_are_what_the_window_takes():
-    assert PHOTO_SUFFIXES == DROPPED

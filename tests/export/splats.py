@@ -55,7 +55,8 @@ def ply_bytes(
     order: "<" or ">". count: what the header claims. before, after: raw bytes around the rows, of
     the elements that `header` may declare (its lines with "BEFORE" come first).
     """
-    kinds = {"f4": "float", "f8": "double", "u1": "uchar", "i2": "short"}
+    kinds = {"f2": "half", "f4": "float", "f8": "double"}
+    kinds |= {"u1": "uchar", "i1": "char", "u2": "ushort", "i2": "short", "i4": "int"}
     rows = np.empty(
         len(next(iter(columns.values()))), [(n, order + v.dtype.str[1:]) for n, v in columns.items()]
     )

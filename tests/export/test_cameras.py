@@ -49,7 +49,7 @@ def test_cameras_out_and_in_again(tmp_path, scene, name):
     assert torch.allclose(posed.Ks.float(), expected, atol=1e-4)
     assert posed.sizes == ((3 * WIDTH, 3 * HEIGHT),) * 3
     assert [path.read_bytes() for path in posed.paths] == list(scene.photos)
-    assert posed.lens()["intrinsics"] == pytest.approx((210, 216, 120, 90), abs=1e-4)
+    assert posed.upright().intrinsics == tuple([pytest.approx((210, 216, 120, 90), abs=1e-4)] * 3)
     one = posed.of([posed.paths[2]])
     assert torch.equal(one.viewmats, posed.viewmats[2:]) and one.paths == posed.paths[2:]
 
@@ -69,7 +69,7 @@ def test_colmap_by_hand(tmp_path):
     assert torch.allclose(posed.viewmats[0, :3, :3], rotation)
     assert posed.viewmats[0, :3, 3].tolist() == [1, 2, 3]
     assert posed.paths == (tmp_path / "images" / "a b.jpg",)
-    assert posed.lens()["intrinsics"] == pytest.approx((250, 250, 150, 100))  # the photo is half as large
+    assert posed.upright().intrinsics == (pytest.approx((250, 250, 150, 100)),)  # the photo is half as large
 
 
 def test_transforms_of_nerf_by_hand(tmp_path):
@@ -116,7 +116,7 @@ def test_transforms_that_cannot_be_used(tmp_path, text, word):
     ("cameras", "images", "word"),
     [
         ("1 OPENCV 4 3 1 1 2 1 0.3 0 0 0\n", "1 1 0 0 0 0 0 0 1 a.jpg\n\n", "bends"),
-        ("1 PINHOLE 4 3 1 1 2\n", "1 1 0 0 0 0 0 0 1 a.jpg\n\n", "bends"),
+        ("1 PINHOLE 4 3 1 1 2\n", "1 1 0 0 0 0 0 0 1 a.jpg\n\n", "3 numbers, not 4"),
         ("1 PINHOLE 4 3 1 1 2 1\n", "1 1 0 0 0 0 0 0 2 a.jpg\n\n", "posed photos"),
         ("1 PINHOLE 4 3 1 1 2 1\n", "1 1 0 0 0 0\n\n", "posed photos"),
         ("1 PINHOLE 4 3 1 1 2 1\n", "", "posed photos"),
@@ -143,4 +143,4 @@ def test_what_is_missing_is_said(tmp_path, scene):
         posed.of([tmp_path / "other.jpg"])
     posed.paths[0].unlink()
     with pytest.raises(SceneFileError, match="cannot be read"):
-        posed.lens()
+        posed.upright()

@@ -14,6 +14,8 @@ from PIL import Image
 
 from langflash_core.errors import SceneFileError
 from langflash_core.export import read
+from tests.export.additions import ADDITIONS, additions, axes_file, files_to_add_to, ply_of, spz_axes
+from tests.export.additions import outcome as outcome_of_addition
 from tests.export.mutations import damages, other_files, outcome, whole_files
 
 ROOM = 8 * 2**20  # bytes that any reader may take, beside twice what the file says it holds
@@ -171,3 +173,80 @@ def test_glb_accessors_that_claim_too_much(files, tmp_path):
         (tmp_path / "lie.glb").write_bytes(head + text + rest)
         sentence, memory = refused(tmp_path / "lie.glb")
         assert "; " in sentence and memory < ROOM
+
+
+@pytest.fixture(scope="module")
+def addable(tmp_path_factory) -> tuple[Path, dict[str, bytes], dict]:
+    """Where files lie that things are added to, their bytes, and their Gaussians."""
+    folder = tmp_path_factory.mktemp("addable")
+    files, expected = files_to_add_to(folder), {}
+    for name, content in files.items():
+        (folder / name).write_bytes(content)
+        expected[name] = read(folder / name).gaussians
+    return folder, files, expected
+
+
+@pytest.mark.parametrize("kind", sorted({kind for kind, _ in ADDITIONS}))
+def test_what_is_not_known_changes_nothing_or_is_refused_by_name(addable, kind):
+    """Six of every addition; `python -m tests.export.additions` makes thousands."""
+    folder, files, expected = addable
+    if kind not in files:
+        pytest.skip("needs a package that is not installed")
+    table = [row for row in ADDITIONS if row[0] == kind]
+    for name, content, words in additions(files, table, 6 * len(table), seed=5):
+        (folder / name).write_bytes(content)
+        outcome_of_addition(folder / name, expected[name], words)
+    (folder / kind).write_bytes(files[kind])
+
+
+def test_the_rule_sees_other_numbers_and_words_that_are_missing(addable):
+    """Else no addition could be wrong."""
+    folder, files, expected = addable
+    path = folder / "a.ply"
+    moved = bytearray(files["a.ply"])
+    moved[-40] ^= 1  # of the last Gaussian's f_dc or f_rest
+    path.write_bytes(bytes(moved))
+    with pytest.raises(AssertionError, match="are others"):
+        outcome_of_addition(path, expected["a.ply"], ())
+    path.write_bytes(files["a.ply"].replace(b"float x", b"quad x"))
+    with pytest.raises(AssertionError, match="stranger"):
+        outcome_of_addition(path, expected["a.ply"], ("stranger",))
+    path.write_bytes(files["a.ply"])
+
+
+def test_axes_behind_a_large_extension_are_found(addable, tmp_path):
+    """They turn the scene: a reader that stops before them shows it on its head."""
+    _, files, expected = addable
+    assert not np.array_equal(expected["axes3.spz"].means, expected["three.spz"].means)
+    plain = gzip.decompress(axes_file(files["three.spz"]))
+    axes = plain[-12:]
+    large = struct.pack("<II", 7, 100_000) + bytes(100_000)
+    (tmp_path / "a.spz").write_bytes(gzip.compress(plain[:-12] + large + axes, 1))
+    assert np.array_equal(read(tmp_path / "a.spz").gaussians.means, expected["axes3.spz"].means)
+    for bad in (struct.pack("<II", 7, 2**31) + axes, struct.pack("<II", 7, 2**21) + bytes(2**21) + axes):
+        (tmp_path / "a.spz").write_bytes(gzip.compress(plain[:-12] + bad, 1))
+        assert "extension 0x7 of 2" in refused(tmp_path / "a.spz")[0]
+
+
+def test_axes_that_no_version_names_are_refused(files, tmp_path):
+    seen = set()
+    for seed in range(12):
+        content, word = spz_axes(files["three.spz"], np.random.default_rng(seed))
+        (tmp_path / "a.spz").write_bytes(content)
+        seen.add(word)
+        if word == "axes 0":  # unspecified
+            assert len(read(tmp_path / "a.spz").gaussians) == 60
+        else:
+            assert f"names {word}" in refused(tmp_path / "a.spz")[0]
+    assert len(seen) == 4
+
+
+def test_an_element_twice_is_refused(files, tmp_path):
+    ply = ply_of(files["a.compressed.ply"])
+    twice = ply.with_element(0, *ply.elements[0][:2], list(ply.elements[0][2]), ply.bodies[0])
+    (tmp_path / "a.compressed.ply").write_bytes(twice.packed())
+    assert "two elements chunk" in refused(tmp_path / "a.compressed.ply")[0]
+    ply = ply_of(files["a.ply"])
+    twice = ply.with_element(0, *ply.elements[0][:2], list(ply.elements[0][2]), bytes(len(ply.bodies[0])))
+    (tmp_path / "a.ply").write_bytes(twice.packed())
+    assert "two elements vertex" in refused(tmp_path / "a.ply")[0]

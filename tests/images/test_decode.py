@@ -92,6 +92,19 @@ def test_colour_profiles_become_srgb(tmp_path):
     assert np.array_equal(broken, np.asarray(image))
 
 
+@pytest.mark.parametrize(("said", "green"), [("R03", (0, 255, 0)), ("R98", (144, 255, 60))])
+def test_adobe_rgb_that_only_exif_speaks_of(tmp_path, said, green):
+    """Cameras write no profile: index R03 alone says it. Green of sRGB is (144, 255, 60) there."""
+    tags = Image.Exif()
+    tags[0x8769] = {0xA001: 0xFFFF, 0xA005: {1: said}}
+    picture = Image.new("RGB", (320, 240), (144, 255, 60))
+    picture.paste((90, 90, 90), (0, 0, 160, 240))
+    shown = pixels(saved(picture, tmp_path / "a.jpg", exif=tags.tobytes(), quality=100, subsampling=0))
+    assert np.abs(shown[100, 300] - green).max() <= 3  # JPEG rounds, and 12.92 times a step near black
+    grey = 255 * (1.055 * (90 / 255) ** (563 / 256 / 2.4) - 0.055) if said == "R03" else 90
+    assert np.abs(shown[100, 20] - grey).max() <= 1.5
+
+
 @pytest.mark.parametrize("orientation", range(1, 9))
 def test_all_orientations_come_out_upright(tmp_path, orientation):
     upright = room_picture(96, 64)

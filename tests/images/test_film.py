@@ -7,6 +7,7 @@ import cv2
 import numpy as np
 import pytest
 
+from langflash_core.apart import process
 from langflash_core.errors import Cancelled, FilmError
 from langflash_core.images.film import LOOKS, opened
 from tests import films
@@ -97,3 +98,65 @@ def test_what_is_no_film_is_a_sentence(film: Path, tmp_path: Path, capfd) -> Non
             read(tmp_path / name)
         assert raised.value.exit_code == 2
     assert capfd.readouterr().err == "", "decoders say nothing themselves"
+
+
+@pytest.fixture(scope="module")
+def fields(film: Path) -> Path:
+    """Of a walk of 50 pictures a second."""
+    return films.write(film.with_name("fields.mp4"), films.walk(100, 3.0), 50)
+
+
+@pytest.fixture
+def alone(monkeypatch, tmp_path: Path):
+    """The decoder of OpenCV, without the program of imageio-ffmpeg."""
+    (tmp_path / "imageio_ffmpeg.py").write_text("raise ImportError")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    process.end_idle()
+    yield
+    process.end_idle()
+
+
+@pytest.mark.parametrize("codec, suffix", [
+    (films.H264, ".mp4"), (films.MPEG2, ".ts"), (films.MPEG2, ".mpg"),
+    (("-c:v", "mpeg4", "-q:v", "2"), ".avi"), (("-c:v", "prores_ks"), ".mov"),
+])  # fmt: skip
+def test_interlaced_pictures_are_taken_apart(fields: Path, codec: tuple[str, ...], suffix: str) -> None:
+    path = films.interlaced(fields, fields.with_name(f"interlaced{suffix}"), *codec)
+    pictures = read(path)
+    assert len(pictures) == pytest.approx(2.0 * LOOKS, abs=1)
+    part = read(path, 0.8, 1.4)
+    assert part[0][0] == pytest.approx(0.8) and 1.4 - 1 / LOOKS < part[-1][0] <= 1.4 + 1e-6
+    for seconds, picture in (*pictures[::7], *part[::7]):  # of its two moments the first
+        assert alike(picture, films.seen(3.0 * round(50 * seconds))), seconds
+
+
+def test_interlaced_pictures_are_upright_and_their_pixels_square(fields: Path) -> None:
+    path = films.interlaced(fields, fields.with_name("upright.mp4"), *films.H264)
+    assert alike(read(films.turned(path, 90))[0][1], cv2.rotate(FIRST, cv2.ROTATE_90_COUNTERCLOCKWISE))
+    assert alike(read(films.turned(path, 270))[0][1], cv2.rotate(FIRST, cv2.ROTATE_90_CLOCKWISE))
+    wide = films.interlaced(fields, fields.with_name("wide.mp4"), *films.H264, "-aspect", "8:3")
+    assert read(wide)[0][1].shape == (240, 640, 3)
+
+
+def test_a_film_that_is_interlaced_from_the_middle_on_is_read_to_its_end(fields: Path) -> None:
+    pictures = read(films.mixed(fields, 1.0))
+    seconds, last = pictures[-1]
+    assert seconds > 1.8 and alike(last, films.seen(3.0 * round(50 * seconds)))
+    times = [each for each, _ in pictures]
+    assert times == sorted(set(times)) and np.diff(times).max() < 0.15
+
+
+def test_av1_is_read(film: Path) -> None:
+    """OpenCV may open it, and decode none of its pictures."""
+    out = film.with_name("av1.mkv")
+    films.ffmpeg("-i", film, "-c:v", "libsvtav1", "-preset", "10", "-crf", "20", out)
+    pictures = read(out)
+    assert len(pictures) == pytest.approx(45, abs=1) and alike(pictures[0][1], FIRST)
+
+
+def test_without_a_program_pictures_that_come_equal_are_doubtful(fields: Path, film: Path, alone) -> None:
+    # A second of interlaced pictures: 15 looks, the last whole one that they repeat, and one by rounding.
+    for path, least, most in ((films.mixed(fields, 1.0), 15, 17), (film, 0, 0)):
+        with opened(path) as reader:
+            count = sum(1 for _ in reader.pictures(0.0, None, nothing))
+            assert least <= reader.doubtful <= most < count

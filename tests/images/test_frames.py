@@ -7,6 +7,7 @@ import cv2
 import numpy as np
 import pytest
 
+from langflash_core.apart import process
 from langflash_core.errors import Cancelled, FilmError
 from langflash_core.images import frames
 from langflash_core.images.film import Reader
@@ -158,6 +159,39 @@ def test_what_shows_nothing_is_a_sentence(tmp_path: Path, home: Path) -> None:
     with pytest.raises(FilmError, match="nothing from 9 s on"):
         chosen(tmp_path / "still.mp4", start=9.0)
     assert len(list((home / "films").iterdir())) == 1, "nothing of those is kept but the still's frame"
+
+
+@pytest.fixture
+def alone(monkeypatch, tmp_path: Path):
+    """The decoder of OpenCV, without the program of imageio-ffmpeg."""
+    (tmp_path / "imageio_ffmpeg.py").write_text("raise ImportError")
+    monkeypatch.syspath_prepend(str(tmp_path))
+    process.end_idle()
+    yield
+    process.end_idle()
+
+
+def test_what_the_decoder_does_is_not_blamed_on_who_filmed(tmp_path: Path, alone, home: Path) -> None:
+    """Black, still, bare: OpenCV gives whatever lay in its memory for interlaced pictures."""
+    whole = films.write(tmp_path / "my walk.mp4", films.walk(60, 4.0), 30)
+    path = films.interlaced(whole, tmp_path / "my tape.ts", *films.MPEG2)
+    with pytest.raises(FilmError) as refused:
+        strip_of(path)
+    said = str(refused.value)
+    assert said.startswith("my tape.ts comes as equal pictures from the decoder, as interlaced films do; ")
+    assert "langflash[video]" in said and said.endswith("ffmpeg -i 'my tape.ts' -vf yadif converted.mp4")
+    assert not any((home / "films").iterdir())
+    films.ffmpeg("-i", path, *said.split("'my tape.ts' ")[1].split()[:2], tmp_path / "converted.mp4")
+    strip, choice = chosen(tmp_path / "converted.mp4")
+    assert not notes_on(strip, choice) and len(choice.chosen) > 4, "as the sentence says"
+
+
+def test_a_film_that_the_decoder_reads_in_part_says_so(tmp_path: Path, alone) -> None:
+    film = films.write(tmp_path / "walk.mp4", films.walk(150, 3.0), 50)
+    notes = notes_on(*chosen(films.mixed(film, 2.0)))
+    # 15 of 45 looks, the last whole picture that they repeat, and one by rounding.
+    shares = tuple(f"{share}% of mixed.mkv comes as equal pictures" for share in range(33, 39))
+    assert any(note.startswith(shares) for note in notes), notes
 
 
 @pytest.mark.parametrize(("part", "said"), [

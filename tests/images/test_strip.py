@@ -74,7 +74,7 @@ def test_an_index_that_is_not_whole_is_none(tmp_path: Path) -> None:
         (tmp_path / still.file).touch()
     found = read_strip(tmp_path)
     assert found is not None and found.stills == kept.stills and found.notes == kept.notes
-    for content in (b"", b"[]", b"{}", written(kept).replace(b'"format": 2', b'"format": 1')):
+    for content in (b"", b"[]", b"{}", written(kept).replace(b'"format": 3', b'"format": 2')):
         (tmp_path / module.INDEX).write_bytes(content)
         assert read_strip(tmp_path) is None
 

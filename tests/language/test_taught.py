@@ -78,7 +78,9 @@ def test_a_group_that_is_said_not_to_be_a_word_does_not_answer_it_even_where_neg
     said = taught(scene, atom_denials={0: ("armchair",)})
     before, after = score(scene, "armchair"), score(said, "armchair")
     assert before[0] > SPACE.threshold > 0.7 > after[0], "not even nearly"
-    assert after[1:] == before[1:]
+    # The denial adds a dimension to what the three atoms span, these are products of another shape: cosines
+    # good to 1e-6, and relevancy moves by a quarter of temperature (10) times the error of two of them.
+    assert after[1:] == pytest.approx(before[1:], abs=1e-5)
 
 
 def test_several_denials_leave_nothing_of_any(scene):

@@ -164,7 +164,10 @@ def test_nothing_and_one_edge_come_back_as_they_are():
     assert np.array_equal(alone.viewmats, np.repeat(np.eye(4)[None], 3, 0))
     step = _matrix([0.1, 0, 0], [0.2, 0, 0])
     two = placed(2, {(0, 1): _edge(step)})
-    assert two.kept == ((0, 1),) and np.array_equal(two.viewmats[1], step)
+    assert two.kept == ((0, 1),)
+    np.testing.assert_allclose(
+        two.viewmats[1], step, rtol=0, atol=1e-15
+    )  # float64 products with the identity
     same = placed(3, {(0, 1): _edge(np.eye(4)), (1, 2): _edge(np.eye(4)), (0, 2): _edge(np.eye(4))})
     assert isinstance(same, Placed) and np.isfinite(same.viewmats).all()  # one photo three times
 

@@ -80,8 +80,9 @@ def test_attention_to_a_memory_in_parts_equals_that_to_all_of_it():
     torch.manual_seed(0)
     attention, query, memory = Attention(16, 4).eval(), torch.randn(1, 5, 16), 30 * torch.randn(1, 40, 16)
     parts = (attention.memory(part, part) for part in memory.split((1, 30, 9), 1))
+    # Values of up to 30, whose shares hang on logits of up to 46.
     assert torch.allclose(
-        attention.gathered_in_turn(query, parts), attention(query, memory, memory), atol=ROUNDING
+        attention.gathered_in_turn(query, parts), attention(query, memory, memory), atol=30 * ROUNDING
     )
 
 

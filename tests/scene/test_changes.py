@@ -200,9 +200,9 @@ def test_two_scenes_become_one_whose_undoing_leaves_the_first(tmp_path: Path) ->
     atoms = first.semantics.num_atoms
     assert whole.record.atom_names == {1: "lamp", atoms: "cat"} and whole.record.silent_atoms == (atoms + 2,)
     theirs = whole.rows(torch.arange(COUNT, COUNT + 90))
-    features = theirs.semantics.dense_weights() @ theirs.semantics.dictionary
-    own = second.semantics.dense_weights() @ second.semantics.dictionary
-    torch.testing.assert_close(features, own, atol=1e-7, rtol=0)  # the same numbers, zeros added
+    weights, own = theirs.semantics.dense_weights(), second.semantics.dense_weights()
+    assert torch.equal(weights[:, atoms:], own) and not weights[:, :atoms].any()
+    assert torch.equal(theirs.semantics.dictionary[atoms:], second.semantics.dictionary)
     torch.testing.assert_close(theirs.gaussians.scales, second.gaussians.scales * 0.5)  # in the first's unit
     low, high = theirs.gaussians.means.quantile(0.05, dim=0), first.gaussians.means.quantile(0.95, dim=0)
     assert low[0] > high[0]  # beside each other

@@ -12,6 +12,7 @@ import safetensors.torch
 import torch
 
 from langflash_core.errors import OutputError, SceneFileError
+from langflash_core.export import export, read
 from langflash_core.scene import container
 from langflash_core.scene.assemble import assemble
 from langflash_core.scene.fields import REQUIRED, field_bytes
@@ -266,7 +267,7 @@ def test_a_file_with_a_field_missing_or_of_a_wrong_type_is_refused_even_with_a_r
     assert "scales" in rewrite({**fields, "scales": -fields["scales"]})
     assert "means" in rewrite({**fields, "means": fields["means"] * torch.nan})
     assert "weight_ids" in rewrite({**fields, "weight_ids": fields["weight_ids"] + 100})
-    assert "fields" in rewrite({**fields, "stranger": torch.zeros(2)})
+    assert "stranger" in rewrite({**fields, "stranger": torch.zeros(2)})
     assert "view_ids" in rewrite({**fields, "view_ids": fields["view_ids"] + 100})
     assert "view_ids" in rewrite({**fields, "view_ids": fields["view_ids"].float()})
     assert "view_ids" in rewrite({**fields, "view_ids": fields["view_ids"][:-1].clone()})
@@ -374,6 +375,17 @@ def test_a_record_that_makes_no_sense_is_refused(path, key, value, words):
         with pytest.raises(SceneFileError) as told:  # without torch
             describe_file(path)
         assert words in str(told.value)
+
+
+def test_more_than_a_thousand_photos_come_back_in_order(scene, tmp_path):
+    """Their names have three digits, or more."""
+    photos = tuple(scene.photos[0] + bytes([view % 251, view // 251]) for view in range(1003))
+    viewmats, Ks = scene.viewmats[:1].repeat(1003, 1, 1), scene.Ks[:1].repeat(1003, 1, 1)
+    many = replace(scene, photos=photos, viewmats=viewmats, Ks=Ks, record=Record())
+    save(many, tmp_path / "a.langflash")
+    assert load(tmp_path / "a.langflash").photos == photos
+    export(many, tmp_path / "a.ply")
+    assert read(tmp_path / "a.ply").photos == photos
 
 
 def test_the_light_of_its_photos_comes_back(scene, tmp_path):

@@ -119,7 +119,7 @@ def _kept_step(path: Path) -> object:
 
 def _posed(path: Path) -> object:
     posed = reader_of(path)()
-    return posed.lens() if hasattr(posed, "lens") else posed  # type: ignore[attr-defined]
+    return posed.upright() if hasattr(posed, "upright") else posed  # type: ignore[attr-defined]
 
 
 def _session(path: Path) -> object:

@@ -48,7 +48,7 @@ def run(args: Namespace, out: TextIO) -> None:
     from langflash_core.mending.cleaning import cleaned
     from langflash_core.scene.file import save
 
-    scene = open_scene(args.scene)
+    scene = open_scene(args.scene, args.axes)
     with ProgressBar() as progress:
         progress("looking", 0.2)
         found = cleaned(scene, recipe)

@@ -22,13 +22,14 @@ def run(args: Namespace, out: TextIO) -> None:
     from langflash_core.writing import prepared, write
 
     from ..renderers import open_renderer
-    from ..scenes import open_scene
+    from ..scenes import open_scene, say_hints
 
     request = request_of(args)
     prepared(request)
     for path in (args.scene, *args.beside):
         readable_file(path, "scene", SceneFileError)
-    scene = open_scene(args.scene)
+    scene = open_scene(args.scene, request.axes_of(args.scene))
+    say_hints(scene, request.prompts)
     with ProgressBar() as progress:
         said = write(scene, request, renderers=partial(open_renderer, args.backend), progress=progress)
     print(f"{args.output}: {said}", file=out)

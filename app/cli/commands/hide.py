@@ -10,7 +10,7 @@ from ...places import forget_pictures
 from ..files import checked_scene
 from ..renderers import open_renderer
 from ..report import ProgressBar, write_json
-from ..scenes import open_scene
+from ..scenes import open_scene, say_hints
 
 if TYPE_CHECKING:
     from langflash_core.mending.hiding import Hidden
@@ -45,6 +45,7 @@ def run(args: Namespace, out: TextIO) -> None:
     )
     hiding = Hiding(args.how, blocks, margin, args.photos == "painted", not args.open)
     scene = open_scene(args.scene)
+    say_hints(scene, args.prompts)
     members = torch.from_numpy(answering(scene, tuple(args.prompts), args.threshold))
     picture = None
     with ProgressBar() as progress, open_renderer(args.backend) as renderer:

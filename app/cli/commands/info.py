@@ -28,7 +28,7 @@ def run(args: Namespace, out: TextIO) -> None:
         raise InputError("no scene was named; name one, or use --limits or --sbom")
     document = {
         "scene": str(args.scene),
-        **_described(args.scene),
+        **_described(args.scene, args.axes),
         "file_bytes": args.scene.stat().st_size,
     }
     if args.json:
@@ -45,16 +45,16 @@ def _print_limits(as_json: bool, out: TextIO) -> None:
         print(f"{limit.variable:{widths[0]}}  {limit.told():>{widths[1]}}  {limit.what}", file=out)
 
 
-def _described(path: Path) -> dict[str, Any]:
+def _described(path: Path, axes: str | None) -> dict[str, Any]:
     """Our own files without torch; those of other programs as the scene they become."""
     from langflash_core.scene.report import describe, describe_file
 
     readable_file(path, "scene", SceneFileError)
-    if path.suffix.lower() == ".langflash":
+    if path.suffix.lower() == ".langflash" and axes is None:
         return describe_file(path)
     from ..scenes import open_scene
 
-    return describe(open_scene(path))
+    return describe(open_scene(path, axes))
 
 
 def _for_people(document: dict[str, Any]) -> dict[str, Any]:
@@ -69,6 +69,7 @@ def _for_people(document: dict[str, Any]) -> dict[str, Any]:
         "left_out": left_out_line(document["left_out"] or {}, document["photos"]),
         "timings": document["timings"] or "",
         "pruning": _pruned(document["pruning"]),
+        "antialiased": document["antialiased"] or "",
     }
     world = world_from_json(document["world"]) if document["world"] else None
     lines["world"] = world_line(world, document["metric_scale"])

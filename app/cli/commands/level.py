@@ -35,7 +35,7 @@ def run(args: Namespace, out: TextIO) -> None:
 
     from ..scenes import open_scene
 
-    scene = open_scene(args.scene)
+    scene = open_scene(args.scene, args.axes)
     world = level.found_world(scene, up=args.up, north=args.north, origin=args.origin)
     scene = scene.with_record(world=world)
     if metres is not None:

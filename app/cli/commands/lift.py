@@ -8,7 +8,7 @@ from langflash_core.errors import ImageError, InputError, WeightsError
 from langflash_core.files import check_output_file, readable_file
 
 from ..renderers import open_renderer
-from ..report import ProgressBar, write_json
+from ..report import ProgressBar, say_warnings, write_json
 from ..scenes import open_scene
 
 SUFFIXES = (".langflash", ".ply", ".glb")
@@ -22,18 +22,20 @@ def run(args: Namespace, out: TextIO) -> None:
     """
     start = time.perf_counter()
     if args.photos and not args.poses:
-        raise InputError("photos need --poses, a transforms.json or a COLMAP text model in the scene's world")
+        raise InputError("photos need --poses, a transforms.json or a COLMAP model in the scene's world")
     for photo in args.photos or ():
         readable_file(photo, "photo", ImageError)
     if args.weights is not None:
         readable_file(args.weights, "checkpoint", WeightsError)
     check_output_file(args.output, SUFFIXES, inputs=[args.scene, *(args.photos or ())])
-    scene = open_scene(args.scene)
+    scene = open_scene(args.scene, args.axes)
     from langflash_core.export import export
     from langflash_core.files import make_folder
     from langflash_core.lift import lift, posed_views
 
-    views, viewmats = posed_views(args.poses, args.photos or ()) if args.poses else (None, None)
+    views, viewmats = None, None
+    if args.poses:
+        views, viewmats = posed_views(args.poses, args.photos or (), scene.record.shift)
     with ProgressBar() as progress, open_renderer(args.backend) as renderer:
         lifted = lift(
             scene,
@@ -46,6 +48,7 @@ def run(args: Namespace, out: TextIO) -> None:
         )
         make_folder(args.output.parent)
         export(lifted, args.output)
+    say_warnings(lifted.record.warnings[len(scene.record.warnings) :])
     document = {
         "scene": str(args.output),
         "gaussians": len(lifted.gaussians),

@@ -10,7 +10,7 @@ from langflash_core.phrases import read_phrases
 from langflash_core.request import spoken
 
 from ..files import checked_scene
-from ..report import ProgressBar, write_json
+from ..report import ProgressBar, say_warnings, write_json
 from ..survey import run_survey
 from ..vocabulary import taught_by
 
@@ -61,6 +61,7 @@ def _one_scene(
     files = [{kind: str(args.output / Path(path).name) for kind, path in entry.items()} for entry in staged]
     document = {"scene": str(path), "view": choice.view, "backend": renderer.backend}
     document.update(answers_document(scene, result, files))
+    say_warnings(dict.fromkeys(answer.note for answer in result.answers if answer.note))
     if args.json:
         write_json(document, out)
     else:

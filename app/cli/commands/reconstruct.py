@@ -87,10 +87,10 @@ def _written(args: Namespace, films: Sequence[dict[str, Any]]) -> "Scene":
     from langflash_core.export.cameras import read_posed
     from langflash_core.scene.file import save
 
-    lens, viewmats = {"fov": args.fov, "intrinsics": args.intrinsics}, None
+    fov, intrinsics, viewmats = args.fov, args.intrinsics, None
     if args.poses:
-        posed = read_posed(args.poses).of(args.photos)
-        lens, viewmats = posed.lens(), posed.viewmats
+        posed = read_posed(args.poses).of(args.photos).upright()
+        intrinsics, viewmats = posed.intrinsics, posed.viewmats
     with ProgressBar() as progress:
         said = list[str]()
 
@@ -102,7 +102,8 @@ def _written(args: Namespace, films: Sequence[dict[str, Any]]) -> "Scene":
 
         scene = pipeline.reconstruct(
             args.photos,
-            **lens,
+            fov=fov,
+            intrinsics=intrinsics,
             viewmats=viewmats,
             preset=args.preset,
             weights=args.weights,

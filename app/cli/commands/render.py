@@ -17,7 +17,7 @@ from langflash_core.writing.drawn import Look
 from ..cameras import chosen_camera
 from ..renderers import open_renderer
 from ..report import ProgressBar, write_json
-from ..scenes import open_scene
+from ..scenes import open_scene, say_hints
 
 
 def run(args: Namespace, out: TextIO) -> None:
@@ -34,7 +34,8 @@ def run(args: Namespace, out: TextIO) -> None:
     readable_file(args.scene, "scene", SceneFileError)
     check_output_file(args.output, (".png",), inputs=[args.scene])
 
-    scene = open_scene(args.scene)
+    scene = open_scene(args.scene, args.axes)
+    say_hints(scene, prompts)
     _check_atom(picture, atom, scene)
     camera, colours = choice.of(scene), HeatColours(args.colormap, args.span)
     with ProgressBar() as progress, open_renderer(args.backend, fade=args.fade, fill=args.fill) as renderer:

@@ -22,6 +22,7 @@ from ..values import (
     whole_count,
 )
 from .shared import (
+    add_axes,
     add_backend,
     add_camera,
     add_colours,
@@ -108,7 +109,7 @@ def add_reconstruct(commands) -> None:
         "--poses",
         type=Path,
         metavar="PATH",
-        help="a transforms.json or COLMAP text model with the photos' poses and lenses: they are not sought, "
+        help="a transforms.json or COLMAP model with the photos' poses and lenses: they are not sought, "
         "and the scene is in their world and unit",
     )
     command.add_argument(
@@ -258,6 +259,7 @@ def add_render(commands) -> None:
     )
     add_shown(command)
     add_colours(command)
+    add_axes(command)
     add_backend(command)
     add_json(command)
 
@@ -336,6 +338,7 @@ def add_export(commands) -> None:
     )
     add_camera(command)
     add_shown(command)
+    add_axes(command, written=True)
     add_backend(command)
 
 
@@ -353,7 +356,7 @@ def add_lift(commands) -> None:
         metavar="PHOTO",
         help="of the place, with --poses; else views of itself",
     )
-    command.add_argument("--poses", type=Path, metavar="PATH", help="transforms.json, or a COLMAP text model")
+    command.add_argument("--poses", type=Path, metavar="PATH", help="transforms.json, or a COLMAP model")
     command.add_argument(
         "--up",
         choices=("x", "y", "z", "-x", "-y", "-z"),
@@ -364,6 +367,7 @@ def add_lift(commands) -> None:
     command.add_argument(
         "--weights", type=Path, metavar="PATH", help="a checkpoint instead of the shipped ones"
     )
+    add_axes(command)
     add_backend(command)
     add_json(command)
 
@@ -453,6 +457,7 @@ def add_clean(commands) -> None:
     command.add_argument("--save-recipe", type=Path, metavar="FILE", help="a .json, for other scenes")
     command.add_argument("--fill", action="store_true", help="fill what was removed from what is around it")
     command.add_argument("--preview", type=Path, metavar="IMG", help="a .png: what goes, in red, and after")
+    add_axes(command)
     add_backend(command)
     add_json(command)
 
@@ -479,6 +484,7 @@ def add_level(commands) -> None:
     )
     lengths.add_argument("--ceiling", type=above_zero, metavar="METRES", help="the ceiling is so high")
     lengths.add_argument("--door", type=above_zero, metavar="METRES", help="the door is so high")
+    add_axes(command)
     add_json(command)
 
 
@@ -525,6 +531,7 @@ def add_info(commands) -> None:
     command.add_argument(
         "--limits", action="store_true", help="how much readers take of a file, and the variables that say so"
     )
+    add_axes(command)
     add_json(command)
 
 

@@ -4,7 +4,7 @@ import argparse
 from pathlib import Path
 
 from langflash_core.detail import DEFAULT_DETAIL, DETAILS, FEWEST, MOST
-from langflash_core.formats import COLOUR_MAPS
+from langflash_core.formats import AXES, COLOUR_MAPS
 
 from ..values import (
     above_zero,
@@ -131,6 +131,19 @@ def add_backend(command: argparse.ArgumentParser) -> None:
         "--backend",
         choices=("gl", "torch"),
         help="gl: the window's renderer; torch: the slow reference (default: gl if there is OpenGL)",
+    )
+
+
+def add_axes(command: argparse.ArgumentParser, written: bool = False) -> None:
+    """Of a .spz, which may not say them; also of one that is written."""
+    command.add_argument(
+        "--axes",
+        type=str.lower,
+        choices=AXES,
+        metavar="AXES",
+        help="of a .spz that does not say it: where its x, y and z point; rub: right, up, back, as the "
+        "format has it (default); rdf: right, down, front, as SuperSplat and splat-transform write it;"
+        " others alike" + ("; a .spz that is written gets these axes, and says so" if written else ""),
     )
 
 

@@ -1,7 +1,7 @@
 """What can happen while asking: phrases, their answers, the dictionary."""
 
 from dataclasses import dataclass, field, replace
-from itertools import zip_longest
+from itertools import repeat, zip_longest
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -93,9 +93,7 @@ class EditPrompt:
     text: str
 
     def apply(self, state: State) -> State:
-        after = _change_prompt(
-            state, self.key, text=self.text, score=None, like=b"", place=None, foreign=False
-        )
+        after = _change_prompt(state, self.key, text=self.text, score=None, like=b"", place=None, note="")
         first = not state.asking.asked and bool(after.asking.asked)
         mode = pictures.HEAT if first and state.scene.mode is pictures.RGB else after.scene.mode
         return after.with_scene(mode=mode).with_asking(active=self.key).with_asking(named=False)
@@ -292,17 +290,17 @@ class Calibrated:
 @dataclass(frozen=True)
 class PhrasesCompiled:
     """The phrases `keys`, in the order of `query`, are ready to be asked. lapses: as `Asking.lapses` was.
-    foreign: those that read like another language."""
+    notes: on each, or "" (`langflash_core/language/hints.py`)."""
 
     keys: tuple[int, ...]
     query: "CompiledQuery" = field(compare=False, repr=False)
     lapses: int = 0
-    foreign: tuple[int, ...] = ()
+    notes: tuple[str, ...] = ()
 
     def apply(self, state: State) -> State:
         state = Calibrated(self.query.threshold).apply(state)
-        for key in self.keys:
-            state = _change_prompt(state, key, foreign=key in self.foreign)
+        for key, note in zip(self.keys, self.notes or repeat(""), strict=False):
+            state = _change_prompt(state, key, note=note)
         return state if state.asking.negatives else state.with_asking(usual=self.query.negative_texts)
 
 

@@ -34,7 +34,7 @@ class Prompt:
 
     threshold: the person's own, or None for the calibrated one. calibrated: what None means.
     like: a language vector as float32 bytes that is asked instead of the words. place: where in the scene it
-    fits best. foreign: its words read like another language.
+    fits best. note: what a person should know of its words, or "".
     """
 
     key: int
@@ -46,7 +46,7 @@ class Prompt:
     score: float | None = None
     like: bytes = field(default=b"", repr=False)
     place: Vector | None = None
-    foreign: bool = False
+    note: str = ""
 
     @property
     def found(self) -> bool | None:

@@ -47,7 +47,6 @@ class Encode(SceneErrand):
     lapses: int = 0
 
     def run(self, stopping: Asked) -> Iterator[Command]:
-        from langflash_core.language.minilm import reads_foreign
         from langflash_core.language.relevance import compile_query, spoken_dictionary
         from langflash_core.language.spaces import language_space
         from langflash_core.language.words import with_vectors
@@ -58,10 +57,9 @@ class Encode(SceneErrand):
         query = compile_query(scene, space, list(self.texts), negatives=list(self.negatives) or None)
         likes = {row: _vector(like) for row, like in enumerate(self.likes) if like}
         query = with_vectors(query, spoken_dictionary(scene, space), likes)
-        spoken = zip(self.keys, self.texts, self.likes or repeat(b""), strict=False)
-        words = [(key, text) for key, text, like in spoken if not like] if space.name == "minilm" else []
-        foreign = tuple(key for key, text in words if reads_foreign(text))
-        yield PhrasesCompiled(self.keys, query, self.lapses, foreign)
+        noted = zip(query.notes, self.likes or repeat(b""), strict=False)
+        notes = tuple("" if like else note for note, like in noted)
+        yield PhrasesCompiled(self.keys, query, self.lapses, notes)
 
 
 def _vector(content: bytes) -> "Tensor":

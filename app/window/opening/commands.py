@@ -115,7 +115,8 @@ class Choose:
     path: Path
 
     def apply(self, state: State) -> State:
-        others = tuple(path for path in state.opening.chosen if path != self.path)
+        several = state.dialog is not Dialog.MERGE  # one scene is merged at a time
+        others = tuple(path for path in state.opening.chosen if path != self.path and several)
         chosen = others if self.path in state.opening.chosen else (*others, self.path)
         return state.with_opening(chosen=chosen)
 

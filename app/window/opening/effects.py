@@ -2,9 +2,8 @@
 
 from collections.abc import Callable
 from pathlib import Path
-from urllib.parse import unquote, urlparse
 
-from ..commands import Command
+from ..commands import Command, EditDialogPath
 from ..dialogs import Dialog
 from ..effects import Effects, Hands
 from ..kit.textures import Thumbnails
@@ -24,11 +23,11 @@ from .commands import (
     PlaceFound,
     TakeFrames,
 )
+from .pasted import pasted_paths, same_text
 from .state import small
 from .work import LookThrough, PastePicture, ReadFolder, SampleTiles, SmallPictures
 
 POLL_SECONDS = 0.1  # of the desktop's dialog
-_LONGEST = 20_000  # letters of pasted paths
 
 
 class OpeningEffects(Effects):
@@ -93,6 +92,9 @@ class OpeningEffects(Effects):
                 self._hands.submit(SmallPictures(folder, paths))
             case Paste():
                 self._paste()
+            case EditDialogPath(text) if state.dialog is Dialog.OPEN:
+                if len(text) > len(before.typed.text) + 1:  # more than a key brings
+                    self._paste_into_field(text)
             case OpenFilm(path):
                 self._hands.submit(LookThrough(path))
             case TakeFrames() if before.opening.film is not None:
@@ -130,6 +132,13 @@ class OpeningEffects(Effects):
         else:
             self._hands.submit(PastePicture())
 
+    def _paste_into_field(self, text: str) -> None:
+        """Several files that are copied into the field for a path, where they would be one long name."""
+        copied = self._clipboard()
+        paths = pasted_paths(copied) if same_text(text, copied) else ()
+        if len(paths) > 1:
+            self._hands.dispatch(OpenPaths(paths))
+
     def _forget(self, before: State) -> None:
         for path in before.opening.folder.photos if before.opening.folder else ():
             self._thumbnails.drop(small(path))
@@ -161,14 +170,3 @@ def _beside(state: State) -> Path:
     wanted = state.exporting.form.path if state.dialog is Dialog.EXPORT else state.typed.text
     folder = typed_path(wanted).parent
     return folder if folder.is_dir() else Path.home()
-
-
-def pasted_paths(text: str) -> tuple[str, ...]:
-    """Paths and file addresses in copied text, a line each; none where a line is something else."""
-    lines = [line.strip().strip("'\"") for line in text[:_LONGEST].splitlines() if line.strip()]
-    named = [unquote(urlparse(line).path) if line.startswith("file://") else line for line in lines]
-    try:
-        there = [Path(name).expanduser() for name in named]
-        return tuple(map(str, there)) if there and all(path.exists() for path in there) else ()
-    except (OSError, ValueError, RuntimeError):
-        return ()

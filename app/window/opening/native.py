@@ -2,11 +2,13 @@
 
 import shutil
 import sys
+from collections.abc import Iterable
 from pathlib import Path
 
 from imgui_bundle import portable_file_dialogs
 
-from ..scene.drops import FILM_SUFFIXES, PHOTO_SUFFIXES, SCENE_SUFFIXES
+from langflash_core.formats import FILMS_IN, PHOTOS_IN
+from langflash_core.outputs import SCENES_IN
 
 _HELPERS = ("zenity", "matedialog", "qarma", "kdialog")  # what portable-file-dialogs calls on Linux
 
@@ -16,12 +18,18 @@ def is_there() -> bool:
     return sys.platform in ("darwin", "win32") or any(map(shutil.which, _HELPERS))
 
 
+def patterns(endings: Iterable[str]) -> str:
+    """Of names with these endings, or these whole names; in capitals, too, as cameras write them: GTK tells
+    them apart."""
+    stars = [f"*{ending}" if ending.startswith(".") else ending for ending in sorted(set(endings))]
+    return " ".join((*stars, *(star.upper() for star in stars)))
+
+
 class NativeDialog:
     """One dialog; it is open until `chosen` says something. Main thread only."""
 
     def __init__(self, folder: str, scenes_alone: bool = False) -> None:
-        suffixes = SCENE_SUFFIXES if scenes_alone else {*PHOTO_SUFFIXES, *FILM_SUFFIXES, *SCENE_SUFFIXES}
-        endings = " ".join(f"*{suffix}" for suffix in sorted(suffixes))
+        endings = patterns(SCENES_IN if scenes_alone else (*PHOTOS_IN, *FILMS_IN, *SCENES_IN))
         start = folder if Path(folder).is_dir() else str(Path.home())
         filters = ["Scenes" if scenes_alone else "Photos, films and scenes", endings, "All files", "*"]
         title = "Merge a scene into this one" if scenes_alone else "Open photos, a film or a scene"

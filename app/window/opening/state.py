@@ -13,8 +13,8 @@ MOST_FILES = 300  # of a folder that are shown
 
 @dataclass(frozen=True)
 class Folder:
-    """What lies in a folder, by name. left_out: photos, films and scenes beyond `MOST_FILES`. problem: a
-    sentence where it cannot be read."""
+    """What lies in a folder, by name. left_out: folders and files beyond `MOST_FILES` of a kind. unsaid:
+    entries whose names are no text. problem: a sentence where it cannot be read."""
 
     path: Path
     folders: tuple[Path, ...] = ()
@@ -22,6 +22,7 @@ class Folder:
     films: tuple[Path, ...] = ()
     scenes: tuple[Path, ...] = ()
     left_out: int = 0
+    unsaid: int = 0
     problem: str = ""
 
 

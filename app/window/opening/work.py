@@ -13,13 +13,12 @@ from PIL import Image, ImageGrab
 
 from langflash_core.errors import Cancelled, ImageError, LangFlashError
 from langflash_core.files import make_folder, write_atomically
-from langflash_core.formats import is_film
 
 from ...places import state_folder
 from ..commands import Command, ShowPicture
 from ..requests import Asked, Errand, Job
 from ..scene.commands import OpenPaths
-from ..scene.drops import PHOTO_SUFFIXES, SCENE_SUFFIXES
+from ..scene.drops import in_folder, sayable
 from ..scene.samples import pairs
 from .commands import FilmRead, FolderRead, MorePictures
 from .state import MOST_FILES, Folder, sample, small
@@ -128,17 +127,15 @@ def listed(path: Path) -> Folder:
     try:
         with os.scandir(path) as found:
             entries = [(entry.name, entry.is_dir()) for entry in found if not entry.name.startswith(".")]
+        unsaid = [name for name, _ in entries if not sayable(name)]
     except OSError as error:
         return Folder(path, problem=f"This folder cannot be read: {error.strerror or error}.")
-    names = sorted(entries, key=lambda entry: entry[0].lower())
-    files = [path / name for name, folder in names if not folder]
-    photos = [file for file in files if file.suffix.lower() in PHOTO_SUFFIXES]
-    scenes = [file for file in files if file.suffix.lower() in SCENE_SUFFIXES]
-    films = [file for file in files if is_film(file)]
-    folders = [path / name for name, folder in names if folder]
-    shown = (tuple(some[:MOST_FILES]) for some in (folders, photos, films, scenes))
-    left_out = sum(max(len(some) - MOST_FILES, 0) for some in (photos, films, scenes))
-    return Folder(path, *shown, left_out=left_out)
+    names = sorted((entry for entry in entries if sayable(entry[0])), key=lambda entry: entry[0].lower())
+    found = in_folder(path / name for name, folder in names if not folder)
+    folders = tuple(path / name for name, folder in names if folder)
+    kinds = (folders, found.photos, found.films, found.scenes)
+    left_out = sum(max(len(some) - MOST_FILES, 0) for some in kinds)
+    return Folder(path, *(some[:MOST_FILES] for some in kinds), left_out=left_out, unsaid=len(unsaid))
 
 
 def _small(path: Path, side: int = SIDE) -> np.ndarray:

@@ -3,23 +3,23 @@
 `os.path` asks the disk here, because people type paths that `Path` would raise on: too long, say.
 """
 
+import json
 import os
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 from enum import Enum
 from pathlib import Path
 
-from langflash_core.formats import FILMS_IN, is_film
+from langflash_core.formats import SOG_FOLDER, is_film, is_photo, kind_of
 from langflash_core.images.pictures import FILM_PHOTOS as FILM_PHOTOS
 from langflash_core.images.pictures import MAX_PHOTOS as MAX_PHOTOS
-from langflash_core.outputs import DROPPED
+from langflash_core.outputs import DROPPED, SCENES_IN
+from langflash_core.picture_files import is_picture
 
-PHOTO_SUFFIXES = frozenset(
-    {".jpg", ".jpeg", ".png", ".webp", ".heic", ".heif", ".tif", ".tiff", ".bmp", ".avif"}
-)
 SCENE_SUFFIX = ".langflash"
 SCENE_SUFFIXES = frozenset(DROPPED)
-FILM_SUFFIXES = frozenset(FILMS_IN)
+_LARGEST_META = 1_000_000  # bytes; a SOG's has three books of 256 numbers
+_TOLD = 2  # of the messages that are shown at once
 
 
 @dataclass(frozen=True)
@@ -89,41 +89,88 @@ def _with_ending(text: str) -> Path:
     return path if path.suffix else path.with_suffix(SCENE_SUFFIX)
 
 
+def sayable(name: str) -> bool:
+    """Whether a name is text; one of bytes that are no UTF-8 cannot be drawn."""
+    return not any("\ud800" <= letter <= "\udfff" for letter in name)
+
+
+def in_folder(files: Iterable[Path]) -> Drop:
+    """Of the files of one folder photos, films and scenes, by their names, in order. The pictures of a SOG
+    are parts of one scene, its meta.json."""
+    files = tuple(files)
+    parts = _sog_parts(files)
+    others = [file for file in files if file not in parts]
+    photos, films = tuple(filter(is_photo, others)), tuple(filter(is_film, others))
+    whole = [file for file in parts if file.name == SOG_FOLDER]
+    return Drop(photos, films, (*whole, *(file for file in others if file.suffix.lower() in SCENE_SUFFIXES)))
+
+
+def _sog_parts(files: Sequence[Path]) -> frozenset[Path]:
+    """The meta.json of a SOG in a folder and the pictures that it names; nothing where there is none."""
+    meta = next((file for file in files if file.name == SOG_FOLDER), None)
+    try:
+        if meta is None or meta.stat().st_size > _LARGEST_META:
+            return frozenset()
+        parts = [part for part in json.loads(meta.read_bytes()).values() if isinstance(part, dict)]
+        named = {str(name) for part in parts for name in part.get("files", ())}
+    except (OSError, ValueError, RecursionError, AttributeError, TypeError):
+        return frozenset()
+    return frozenset(file for file in files if file.name in named or (named and file is meta))
+
+
 def sort_drop(paths: Iterable[str | Path]) -> Drop:
     """Sort paths by what they are; a folder stands for the photos directly in it, else for its films,
-    else for its scenes."""
-    photos: list[Path] = []
-    films: list[Path] = []
-    scenes: list[Path] = []
-    rejected: list[str] = []
-    for path in map(Path, paths):
-        if os.path.isdir(path):
-            try:
-                inside = sorted(p for p in path.iterdir() if p.is_file() and not p.name.startswith("."))
-            except OSError as error:
-                rejected.append(f"The folder {path.name} cannot be read: {error.strerror or error}.")
-                continue
-            found = [p for p in inside if p.suffix.lower() in PHOTO_SUFFIXES]
-            kept = [p for p in inside if p.suffix.lower() in SCENE_SUFFIXES]
-            filmed = [p for p in inside if is_film(p)]
-            if not found and not filmed and not kept:
-                rejected.append(f"The folder {path.name} holds no photo; drop a folder of JPEG or PNG files.")
-            photos += found
-            films += [] if found else filmed
-            scenes += [] if found or filmed else kept
-        elif not os.path.exists(path):
-            rejected.append(f"{path} does not exist; check the path.")
-        elif path.suffix.lower() in SCENE_SUFFIXES:
-            scenes.append(path)
-        elif path.suffix.lower() in PHOTO_SUFFIXES:
-            photos.append(path)
-        elif is_film(path):
-            films.append(path)
-        else:
-            rejected.append(
-                f"{path.name} is no photo, film or scene; drop JPEG, PNG, .mp4, .langflash or .ply files."
-            )
-    return Drop(_each_once(photos), _each_once(films), _each_once(scenes), tuple(rejected))
+    else for its scenes. A file with a name that says nothing is a photo where it begins as one."""
+    found = [_sorted(path) for path in map(Path, paths)]
+    return Drop(
+        photos=_each_once(path for drop in found for path in drop.photos),
+        films=_each_once(path for drop in found for path in drop.films),
+        scenes=_each_once(path for drop in found for path in drop.scenes),
+        rejected=tuple(sentence for drop in found for sentence in drop.rejected),
+    )
+
+
+def _sorted(path: Path) -> Drop:
+    told = os.fsencode(path).decode(errors="replace")
+    if not os.path.exists(path):
+        return Drop(rejected=(f"{told} does not exist; check the path.",))
+    if not sayable(os.path.realpath(path)):
+        return Drop(rejected=(f"The name of {told} is not UTF-8; rename it.",))
+    if os.path.isdir(path):
+        return _folder(path)
+    if kind_of(path) in SCENES_IN or path.suffix.lower() in SCENE_SUFFIXES:
+        return Drop(scenes=(path,))
+    if is_film(path):
+        return Drop(films=(path,))
+    if is_photo(path) or is_picture(path):
+        return Drop(photos=(path,))
+    remedy = "drop JPEG, PNG, .mp4, .langflash or .ply files"
+    return Drop(rejected=(f"{path.name} is no photo, film or scene; {remedy}.",))
+
+
+def _folder(path: Path) -> Drop:
+    """Its photos, else its films, else its scenes."""
+    try:
+        inside = sorted(p for p in path.iterdir() if p.is_file() and not p.name.startswith("."))
+    except OSError as error:
+        return Drop(rejected=(f"The folder {path.name} cannot be read: {error.strerror or error}.",))
+    unsaid = sum(not sayable(p.name) for p in inside)
+    told = (f"{unsaid} files in {path.name} have names that are not UTF-8; rename them.",) if unsaid else ()
+    found = in_folder(p for p in inside if sayable(p.name))
+    if found.photos:
+        return Drop(photos=found.photos, rejected=told)
+    if found.films:
+        return Drop(films=found.films, rejected=told)
+    if found.scenes or told:
+        return Drop(scenes=found.scenes, rejected=told)
+    remedy = "drop a folder of JPEG or PNG files"
+    return Drop(rejected=(f"The folder {path.name} holds no photo; {remedy}.",))
+
+
+def told_few(sentences: tuple[str, ...]) -> tuple[str, ...]:
+    """What fits on the screen: the first ones, and how many more there are."""
+    shown, more = sentences[:_TOLD], len(sentences) - _TOLD
+    return (*shown, f"{more} more of these could not be opened, for like reasons.") if more > 0 else shown
 
 
 def _each_once(paths: Iterable[Path]) -> tuple[Path, ...]:

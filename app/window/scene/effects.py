@@ -42,7 +42,7 @@ from .commands import (
     Thinned,
     dropped,
 )
-from .drops import sort_drop
+from .drops import sort_drop, told_few
 from .standing import LevelScene
 from .state import WHOLE, WHOLE_PHOTOS, SceneInfo
 from .unfinished import FEWEST
@@ -165,12 +165,17 @@ class SceneEffects(Effects):
     def _open(self, paths: Sequence[str], was_dropped: bool, state: State) -> None:
         perform = self._hands.perform
         drop = sort_drop(paths)
-        for sentence in drop.rejected:
+        for sentence in told_few(drop.rejected):
             perform(Notify(sentence))
         if drop.films:
             perform(OpenFilm(drop.films[0]))
         if len(drop.films) > 1:
             perform(Notify(f"Only {drop.films[0].name} was opened; drop one film at a time."))
+        if drop.scenes and (drop.photos or drop.films):
+            came = "photos" if drop.photos else "a film"
+            perform(Notify(f"{drop.scenes[0].name} was not opened, for {came} came with it; open it alone."))
+        elif len(drop.scenes) > 1:
+            perform(Notify(f"Only {drop.scenes[0].name} was opened; open one scene at a time."))
         if drop.photos and state.scene.info is not None:
             perform(AskAboutDrop(drop.photos))
         elif drop.photos and drop.films:

@@ -47,6 +47,7 @@ from langflash_core.lab.evaluation.sights import Look, Sight, error_picture, lab
 from langflash_core.lab.evaluation.tallies import Shelf, collected, intervals, merged
 from langflash_core.lab.photos import LabelledPhoto
 from langflash_core.lab.photos.fitting import FittedPhoto
+from langflash_core.lab.photos.folder import lenses_of
 from langflash_core.lab.training.measures import (
     accuracy,
     class_ious,
@@ -145,7 +146,7 @@ def judge_case(judge: Judge, case: Case, look: Look | None = None) -> Tally:
     photos = [case.folder.photo(id) for id in case.photos]
     scene, seconds = scene_of(
         photos,
-        photos[0].intrinsics,
+        lenses_of(photos),
         weights=judge.weights,
         preset=judge.preset,
         size=judge.size,

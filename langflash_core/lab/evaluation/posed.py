@@ -19,6 +19,7 @@ from PIL import Image
 from torch import Tensor
 
 from langflash_core.errors import InputError
+from langflash_core.images.lens import Intrinsics
 from langflash_core.images.pictures import centre_box
 from langflash_core.lab.evaluation.alignment import aligned_camera
 from langflash_core.lab.evaluation.labelled import Render
@@ -30,6 +31,7 @@ from langflash_core.lab.evaluation.sights import Look, Sight, error_picture, pho
 from langflash_core.lab.evaluation.tallies import Shelf, collected, merged
 from langflash_core.lab.photos import LabelledPhoto, PhotoFolder
 from langflash_core.lab.photos.fitting import FittedPhoto, fitted
+from langflash_core.lab.photos.folder import lenses_of
 from langflash_core.lab.training.losses import ssim_map
 from langflash_core.lab.training.measures import abs_rel, align_scale, delta1, nan_mean, psnr
 from langflash_core.language.answers import COVERED_ALPHA
@@ -175,7 +177,12 @@ def judge_triple(
     first, between, second = (folder.photo(id) for id in (triple.first, triple.between, triple.second))
     to_second, to_between = relative(first, second), relative(first, between)
     scene, seconds = scene_of(
-        (first, second), first.intrinsics, weights=weights, preset=preset, size=size, networks=networks
+        (first, second),
+        lenses_of((first, second)),
+        weights=weights,
+        preset=preset,
+        size=size,
+        networks=networks,
     )
     placed = scene.num_views == 2
     predicted = scene.viewmats[1].cpu() if placed else torch.eye(4)
@@ -243,7 +250,7 @@ def relative(first: LabelledPhoto, other: LabelledPhoto) -> Tensor:
 
 def scene_of(
     photos: Sequence[LabelledPhoto],
-    intrinsics: tuple[float, float, float, float] | None,
+    intrinsics: Intrinsics | Sequence[Intrinsics] | None,
     *,
     weights: Path | None = None,
     preset: str = "mini",

@@ -19,9 +19,11 @@ from torch import Tensor
 from langflash_core.errors import InputError
 from langflash_core.geometry.cameras import invert_rigid
 from langflash_core.images.decode import read_photo
+from langflash_core.images.lens import Intrinsics
 from langflash_core.images.pictures import centre_box
 from langflash_core.lab.evaluation.posed import Triple, as_seen, key_of
 from langflash_core.lab.photos import LabelledPhoto, PhotoFolder
+from langflash_core.lab.photos.folder import lenses_of
 from langflash_core.lab.rooms import Pack, RoomRenderer, RoomViews, staged_room
 from langflash_core.lab.training.commands import cache_plan
 from langflash_core.resources import asset_path
@@ -40,9 +42,9 @@ class Subject:
     between: LabelledPhoto | None = None
 
     @property
-    def intrinsics(self) -> tuple[float, float, float, float] | None:
-        first = self.photos[0]
-        return None if isinstance(first, Path) else first.intrinsics
+    def intrinsics(self) -> tuple[Intrinsics, ...] | None:
+        known = [photo for photo in self.photos if not isinstance(photo, Path)]
+        return lenses_of(known) if len(known) == len(self.photos) else None
 
     @contextmanager
     def files(self) -> Iterator[tuple[Path, ...]]:

@@ -13,6 +13,7 @@ from torch import Tensor
 
 from langflash_core.errors import InputError
 from langflash_core.geometry.fusion import DepthView
+from langflash_core.images.lens import Intrinsics
 from langflash_core.lab.evaluation.posed import Triple, as_seen, relative
 from langflash_core.lab.evaluation.side_measures import (
     angle_between,
@@ -21,6 +22,7 @@ from langflash_core.lab.evaluation.side_measures import (
     turned_about,
 )
 from langflash_core.lab.photos import LabelledPhoto, PhotoFolder
+from langflash_core.lab.photos.folder import lenses_of
 from langflash_core.lab.rooms import Pack, RoomRenderer, StagedRoom, staged_room
 from langflash_core.lab.rooms.cameras import stands_free
 from langflash_core.lab.training.commands import cache_plan
@@ -71,8 +73,8 @@ class Case:
     showing: Callable[[float], Look] | None = None
 
     @property
-    def intrinsics(self) -> tuple[float, float, float, float] | None:
-        return self.photos[0].intrinsics
+    def intrinsics(self) -> tuple[Intrinsics, ...] | None:
+        return lenses_of(self.photos)
 
 
 def centre_depth(depths: Float[np.ndarray, "H W"]) -> float:

@@ -27,6 +27,7 @@ from langflash_core.lab.evaluation.posed import (
 )
 from langflash_core.lab.evaluation.tallies import merged
 from langflash_core.lab.photos import PhotoFolder
+from langflash_core.lab.photos.folder import lenses_of
 from langflash_core.lab.training.measures import nan_mean
 from langflash_core.reconstruction.networks import Networks
 from langflash_core.running import Progress
@@ -108,7 +109,7 @@ def run_stretches(
     work = list(_scenes(stretches))
     warm = [folder.photo(id) for id in work[0][1]]
     options = {"weights": weights, "preset": preset, "size": size, "networks": Networks()}
-    scene_of(warm, warm[0].intrinsics, **options)
+    scene_of(warm, lenses_of(warm), **options)
     tallies: dict[int, list[Tally]] = {}
     for done, (between, ids) in enumerate(work, start=1):
         tally = Tally()
@@ -145,7 +146,7 @@ def judge_stretch(
     """One scene of the photos `ids` and the photo between them; adds to `tally`."""
     photos, target = [folder.photo(id) for id in ids], folder.photo(between)
     scene, seconds = scene_of(
-        photos, photos[0].intrinsics, weights=weights, preset=preset, size=size, networks=networks
+        photos, lenses_of(photos), weights=weights, preset=preset, size=size, networks=networks
     )
     truths = {photo.id: relative(photos[0], photo).float() for photo in photos[1:]}
     placed = placed_views(scene)

@@ -29,6 +29,7 @@ from langflash_core.lab.evaluation.walk_measures import centres_of, fitted_camer
 from langflash_core.lab.evaluation.walk_subjects import Walk
 from langflash_core.lab.photos import LabelledPhoto
 from langflash_core.lab.photos.fitting import FittedPhoto
+from langflash_core.lab.photos.folder import lenses_of
 from langflash_core.pipeline import reconstruct
 from langflash_core.reconstruction.networks import Networks
 from langflash_core.scene.file import load, save
@@ -120,7 +121,7 @@ def made_of(walk: Walk, frames: Sequence[int], bench: Bench, *, memory: bool = F
     options = {
         "preset": bench.preset,
         "weights": bench.weights,
-        "intrinsics": None if bench.assume_lens else photos[0].intrinsics,
+        "intrinsics": None if bench.assume_lens else lenses_of(photos),
         "size": bench.size,
         "viewmats": torch.from_numpy(truth).float() if bench.given_poses else None,
     }

@@ -29,9 +29,11 @@ import torch
 from torch import Tensor
 
 from langflash_core.errors import InputError
+from langflash_core.geometry.cameras import MIRRORED, invert_rigid, turned_camera
 from langflash_core.images.decode import read_photo
+from langflash_core.images.lens import Intrinsics
 from langflash_core.lab.photos.names import CLASSES40, class_of, spoken
-from langflash_core.picture_files import opened_picture
+from langflash_core.picture_files import opened_picture, stored_shape
 
 PHOTO_SUFFIXES = (".jpg", ".jpeg", ".png")
 MILLIMETRE = 0.001
@@ -70,6 +72,13 @@ class LabelledPhoto:
         if self.K is None:
             return None
         return float(self.K[0, 0]), float(self.K[1, 1]), float(self.K[0, 2]), float(self.K[1, 2])
+
+
+def lenses_of(photos: Sequence[LabelledPhoto]) -> tuple[Intrinsics, ...] | None:
+    """(fx, fy, cx, cy) of each photo, pixels; None: of one of them they are not known."""
+    lenses = [photo.intrinsics for photo in photos]
+    known = tuple(lens for lens in lenses if lens is not None)
+    return known if len(known) == len(lenses) else None
 
 
 @dataclass(frozen=True)
@@ -152,6 +161,30 @@ class PhotoFolder:
             unit = MILLIMETRE
         return steps.astype(np.float32) * (1.0 if unit is None else unit), unit is not None
 
+    def upright_camera(self, id: str) -> tuple[Tensor | None, Tensor | None]:
+        """K and pose of a photo, turned with it where EXIF turns it.
+
+        Raises:
+            InputError: it is stored mirrored.
+        """
+        K = None if self.Ks is None else self.Ks.get(id)
+        pose = None if self.poses is None else self.poses.get(id)
+        path = photo_path(self.root, id)
+        if (K is None and pose is None) or not path.is_file():
+            return K, pose
+        with opened_picture(path) as picture:
+            size, orientation = stored_shape(picture)
+        if orientation == 1:
+            return K, pose
+        if orientation in MIRRORED:
+            raise InputError(
+                f"photo {id} in {self.root} is stored mirrored (EXIF orientation {orientation}), which no "
+                "camera and no pose fits; save it upright, with the camera and the pose of that"
+            )
+        viewmat = torch.eye(4) if pose is None else invert_rigid(pose)
+        turned, viewmat, _ = turned_camera(torch.eye(3) if K is None else K, viewmat, size, orientation)
+        return None if K is None else turned, None if pose is None else invert_rigid(viewmat)
+
     def opinions(self, id: str, size: tuple[int, int]) -> np.ndarray | None:
         """What another network says of a photo, after the crop, (H, W) int64 at `size`; None: nothing.
 
@@ -179,7 +212,7 @@ class PhotoFolder:
                     f"the {what} of photo {id} is {_size(found)} pixels, the photo {_size(image)}; "
                     "bring both to one size"
                 )
-        K = None if self.Ks is None else self.Ks.get(id)
+        K, pose = self.upright_camera(id)
         return LabelledPhoto(
             id=id,
             image=image,
@@ -187,7 +220,7 @@ class PhotoFolder:
             depths=depths,
             metric=metric,
             K=K if K is None or self.crop is None else _moved(K, self.crop),
-            pose=None if self.poses is None else self.poses.get(id),
+            pose=pose,
             opinions=self.opinions(id, (image.shape[0], image.shape[1])),
         )
 

@@ -1,13 +1,19 @@
 """Photos whose poses are given: matches say how large each depth map is in the poses' own unit."""
 
+from collections.abc import Sequence
+
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from langflash_core.errors import InputError
 from langflash_core.network.stereo.matching import Matches, triangulate
 
 _TOLERANCE = 3.0  # standard deviations of a match from its epipolar line
 _LEAST_PARALLAX = 2.0  # standard deviations of a match that its depth must move it by
+_LOOSE = 6.0
+"""Standard deviations within which a pose explains a match: two thirds of a degree of a usual lens."""
+_AGREED = 0.5
+"""Share of the matches which poses explain that are sought: given ones that fit explain as many and more."""
 _FEWEST = 12  # matches that say a map's scale
 
 
@@ -27,6 +33,43 @@ def agreeing(matches: Matches, relative: Float[np.ndarray, "4 4"]) -> Matches:
     depths = triangulate(matches.x_i, matches.x_j, rotation, shift)
     ahead = (depths > 0) & ((x_i * depths[:, None]) @ rotation[2] + shift[2] > 0)
     return matches.subset((distances < _TOLERANCE * matches.sigma) & ahead)
+
+
+def explained(matches: Matches, relative: Float[np.ndarray, "4 4"]) -> int:
+    """How many matches a pose explains, within `_LOOSE` standard deviations: by a point in front of both
+    cameras, or by one that is far away.
+
+    Args:
+        relative: (4, 4), pos_j = R pos_i + t.
+    """
+    rotation, shift = relative[:3, :3], relative[:3, 3]
+    far = np.c_[matches.x_i, np.ones(len(matches))] @ rotation.T
+    depths = triangulate(matches.x_i, matches.x_j, rotation, shift)
+    near = far * depths[:, None] + shift
+    return int((_meets(far, matches) | ((depths > 0) & _meets(near, matches))).sum())
+
+
+def _meets(points: Float[np.ndarray, "n 3"], matches: Matches) -> Bool[np.ndarray, " n"]:
+    """Whether points in front of camera j are seen where their matches are."""
+    ahead = points[:, 2] > 1e-9
+    seen = points[:, :2] / np.where(ahead, points[:, 2], 1)[:, None]
+    return ahead & (np.linalg.norm(seen - matches.x_j, axis=1) < _LOOSE * matches.sigma)
+
+
+def doubt(pairs: Sequence[tuple[int, int]]) -> str:
+    """What a person is told where photos do not look as their poses say, or nothing.
+
+    Args:
+        pairs: of pairs of photos, how many matches the given pose explains, and how many the one that is
+            sought without it.
+    """
+    given, sought = (sum(counts) for counts in zip(*pairs, strict=True)) if pairs else (0, 0)
+    if given >= _AGREED * sought:
+        return ""
+    return (
+        f"the photos do not look as the poses say: {given} of {sought} matches between them fit; "
+        "check that poses, lenses and photos belong together"
+    )
 
 
 def log_scales(

@@ -119,7 +119,8 @@ def match_descriptors(
     first = similarity[rows, best]
     similarity[rows, best] = -1
     second = similarity[rows].max(1)
-    distances = np.sqrt(np.maximum(2 - 2 * np.stack((first, second)), 0))
+    # Twins in one photo are as near as each other: rounding, 1e-7 of a product, must not choose between them.
+    distances = np.sqrt(np.maximum(2 - 2 * np.stack((first, second)), 1e-6))
     keep = distances[0] < _RATIO * distances[1]
     return np.stack((rows[keep], best[keep]), 1)
 

@@ -25,7 +25,7 @@ from langflash_core.network.stereo.inputs import (
     with_dense,
 )
 from langflash_core.network.stereo.keypoints import KeyPoints
-from langflash_core.network.stereo.known import agreeing, depth_scales, log_scales
+from langflash_core.network.stereo.known import agreeing, depth_scales, doubt, explained, log_scales
 from langflash_core.network.stereo.matching import (
     MIN_INLIERS,
     Matches,
@@ -44,6 +44,7 @@ _ENOUGH = 100  # matches with one of them
 _OTHER_LENS = 0.05  # change of a focal length, as a logarithm, from which pairs are looked at again
 _DENSE_COST = 2.75
 """Cost from which dense matches are not believed: on validation rooms the wrong ones began at 2.8."""
+_CHECKED = 4  # pairs of known poses that are sought as well
 _BRIDGES = 4  # pairs that are asked, at most, to connect two parts: ten place no photo of four walks more
 
 
@@ -52,13 +53,14 @@ class Poses:
     """viewmats (V, 4, 4), world = view 0; depth_scales (V,) that bring each view's depth map to
     view 0's unit; corrections: what matches say of each map beyond its scale, on the log depths
     before scaling; guessed: views that no match supports. adjusted: where three and more were placed, what
-    they say together, with the lens."""
+    they say together, with the lens. doubt: a sentence where photos do not look as known poses say."""
 
     viewmats: Float[np.ndarray, "V 4 4"]
     depth_scales: Float[np.ndarray, " V"]
     corrections: tuple[Correction, ...]
     guessed: tuple[int, ...]
     adjusted: Adjusted | None = None
+    doubt: str = ""
 
     @property
     def growths(self) -> Float[np.ndarray, " V"]:
@@ -106,7 +108,18 @@ def estimate_poses(
         check()
         agreed[i, j] = _agreed(views[i], views[j], matches, known[j] @ np.linalg.inv(known[i]))
     scales = _known_scales(views, known, agreed)
-    return _of_pairs(views, Placed(known, scales, (), tuple(agreed)), agreed)
+    found = _of_pairs(views, Placed(known, scales, (), tuple(agreed)), agreed)
+    return replace(found, doubt=_doubt(views, edges, known))
+
+
+def _doubt(views: list[PoseInput], edges: dict[tuple[int, int], Matches], known: np.ndarray) -> str:
+    """What is wrong with known poses, by the pairs of photos that share most; nothing where they fit."""
+    pairs = []
+    for i, j in sorted(edges, key=lambda edge: (-len(edges[edge]), edge))[:_CHECKED]:
+        sought = _pair_pose(views[i], views[j], edges[i, j])
+        if sought is not None:
+            pairs.append((explained(edges[i, j], known[j] @ np.linalg.inv(known[i])), sought.num_inliers))
+    return doubt(pairs)
 
 
 def _of_pairs(views: list[PoseInput], found: Placed, agreed: Agreed) -> Poses:

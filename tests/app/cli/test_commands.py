@@ -97,6 +97,36 @@ def test_query_for_people(run, scene_file, tmp_path):
     assert outcome.err == ""  # no bar, no warning
 
 
+def test_what_a_phrase_may_not_mean_is_said(run, scene_file, tmp_path):
+    """On stderr and in the document, of whatever is asked; what it proposes takes the denied thing away."""
+    words = ("no armchair", "armchiar", "wall - armchair")
+    document = run("query", scene_file, *words, "-o", tmp_path / "out", "--json", *TORCH)
+    negated, slip, minus = document.json()["prompts"]
+    assert negated["found"] and negated["note"].endswith('as in "wall - armchair"')
+    assert 'did you mean "armchair"?' in slip["note"] and minus["note"] == ""
+    assert minus["score"] < negated["score"]
+    said = [f"warning: {entry['note']}" for entry in (negated, slip)]
+    assert document.err.splitlines() == said
+    for command in (
+        ("export", scene_file, "-o", tmp_path / "a.ply", "--prompt", "no armchair"),
+        ("hide", scene_file, "no armchair", "-o", tmp_path / "hidden.langflash", *TORCH),
+        (
+            "render",
+            scene_file,
+            "--what",
+            "relevance",
+            "--prompt",
+            "no armchair",
+            "-o",
+            tmp_path / "a.png",
+            *TORCH,
+        ),
+        ("query", "--scenes", scene_file.parent, "no armchair", "-o", tmp_path / "survey", *TORCH),
+    ):
+        outcome = run(*command)
+        assert outcome.code == 0 and said[0] in outcome.err.splitlines(), (command, outcome.err)
+
+
 def test_query_by_cosine_with_own_negatives(run, scene_file, tmp_path):
     cosine = run("query", scene_file, "armchair", "-o", tmp_path, "--mode", "cosine", "--json", *TORCH).json()
     assert cosine["mode"] == "cosine"

@@ -82,3 +82,54 @@ def test_the_watch_sees_writes(tmp_path):
         (tmp_path / "a").write_bytes(b"x")
         os.rename(tmp_path / "a", tmp_path / "b")
     assert places == {str(tmp_path / "a"), str(tmp_path / "b")}
+
+
+@pytest.mark.parametrize(
+    ("words", "name"),
+    [
+        *((("export",), f"a{ending}") for ending in (".ply", ".langflash", ".sog", ".spz", ".html")),
+        (("export", "--what", "depth"), "a.png"),
+        (("export", "--prompt", "armchair", "--what", "labels"), "a.png"),
+        (("export", "--prompt", "armchair", "--what", "boxes", "--replace"), "a.json"),
+        (("render",), "a.png"),
+        (("level",), "a.langflash"),
+        (("clean", "--strength", "0.5"), "a.langflash"),
+    ],
+)
+def test_a_symbolic_link_is_written_through(scene, tmp_path, capsys, words, name):
+    """The link stays one, and the file that it leads to is the new one."""
+    link, target = tmp_path / "out" / name, tmp_path / "far" / "kept.bin"
+    link.parent.mkdir()
+    target.parent.mkdir()
+    target.write_bytes(b"old")
+    link.symlink_to(target)
+    command, *others = words
+    code = main([command, str(scene), *others, "-o", str(link)])
+    assert code == 0, capsys.readouterr().err
+    assert link.is_symlink() and target.stat().st_size > 3 and os.listdir(target.parent) == ["kept.bin"]
+
+
+@pytest.mark.parametrize("command", ["export", "render", "level"])
+@pytest.mark.parametrize("kind", ["circle", "nowhere", "device", "read-only"])
+def test_a_link_that_nothing_can_be_written_through_is_refused_before_the_work(
+    scene, tmp_path, capsys, command, kind
+):
+    name = "a.png" if command == "render" else "a.langflash"
+    link, target = tmp_path / "out" / name, tmp_path / "target"
+    link.parent.mkdir()
+    if kind == "circle":
+        target.symlink_to(link)
+    elif kind == "nowhere":
+        target = tmp_path / "gone" / "target"
+    elif kind == "device":
+        target = Path(os.devnull)
+    else:
+        target.write_bytes(b"old")
+        target.chmod(0o444)
+    link.symlink_to(target)
+    with written() as places:
+        assert main([command, str(scene), "-o", str(link)]) == 2
+    said = capsys.readouterr().err
+    assert said.count("\n") == 1 and name in said and "; " in said
+    assert not {place for place in places if place != os.devnull}, "nothing was begun"
+    assert link.is_symlink() and (kind != "read-only" or target.read_bytes() == b"old")

@@ -115,6 +115,13 @@ class Client:
         self._send(window, "XdndDrop", (0, 0, 0, 0))
         self._await("XdndFinished", uris, patience)
 
+    def set_resources(self, text: str) -> None:
+        """What xrdb would: the desktop's settings, for programs that start from now on."""
+        manager, kind = self._atom("RESOURCE_MANAGER"), self._atom("STRING")
+        content = text.encode()
+        self._x.XChangeProperty(self._display, self._root, manager, kind, 8, 0, content, len(content))
+        self._x.XSync(self._display, 0)
+
     def ask_to_close(self, window: int) -> None:
         """What a window manager's close button sends."""
         message = (c_long * 5)(self._atom("WM_DELETE_WINDOW"), 0, 0, 0, 0)

@@ -2,6 +2,7 @@
 
 import json
 import os
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,7 +13,7 @@ from PIL import Image
 from langflash_core.errors import ImageError, InputError
 from langflash_core.lab.photos import Name, chosen_ids, open_folder
 from langflash_core.lab.photos.fitting import drawn_window, fitted, network_size, seen_through
-from langflash_core.lab.photos.folder import LabelledPhoto
+from langflash_core.lab.photos.folder import LabelledPhoto, camera_matrix, lenses_of, photo_path
 from langflash_core.lab.photos.writing import FolderWriter, NameTable
 
 WIDTH, HEIGHT = 60, 45
@@ -212,3 +213,37 @@ def test_a_centre_that_rounding_moves_outside_is_taken_from_the_edge():
     """455 x 640 at 196 x 266: the widest centre begins 3e-14 pixels left of the photo."""
     image = np.random.default_rng(0).integers(0, 255, (640, 455, 3), dtype=np.uint8)
     assert fitted(LabelledPhoto("1", image), (196, 266)).rgb.shape == (3, 266, 196)
+
+
+def test_a_photo_that_exif_turns_takes_camera_and_pose_along(folder: Path):
+    """Twin: a point in front of the stored photo is where the upright one shows it."""
+    plain = open_folder(folder)
+    path = photo_path(folder, "0007")
+    stored = Image.open(path).convert("RGB")
+    for name in ("labels", "depths"):
+        (folder / name / "0007.png").unlink(missing_ok=True)
+    (folder / "names.csv").unlink()
+    (folder / "photos.json").unlink(missing_ok=True)
+    before = open_folder(folder).photo("0007")
+    assert before.K is not None and before.pose is not None and plain.ids
+    exif = Image.Exif()
+    exif[0x0112] = 6  # to be shown turned to the right: (x, y) comes to (height - y, x)
+    stored.save(path, exif=exif)
+    after = open_folder(folder).photo("0007")
+    assert after.K is not None and after.pose is not None
+    assert after.image.shape[:2] == before.image.shape[1::-1]
+    point = before.pose @ torch.tensor([0.3, -0.2, 2.0, 1.0], dtype=before.pose.dtype)
+    old, new = (p.K @ (torch.linalg.inv(p.pose) @ point)[:3].to(p.K) for p in (before, after))
+    x, y = (old[:2] / old[2]).tolist()
+    assert (new[:2] / new[2]).tolist() == pytest.approx([stored.height - y, x], abs=1e-3)
+    exif[0x0112] = 2
+    stored.save(path, exif=exif)
+    with pytest.raises(InputError, match="mirrored"):
+        open_folder(folder).photo("0007")
+
+
+def test_every_photo_has_its_own_lens(folder: Path):
+    photo = open_folder(folder).photo("0007")
+    other = replace(photo, K=camera_matrix(1.0, 2.0, 3.0, 4.0))
+    assert lenses_of((other, photo)) == ((1, 2, 3, 4), photo.intrinsics)
+    assert lenses_of((photo, replace(photo, K=None))) is None

@@ -5,10 +5,9 @@ from argparse import Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING, TextIO
 
-from langflash_core.batch.sets import PHOTO_SUFFIXES
 from langflash_core.errors import ImageError, InputError
 from langflash_core.files import check_output_file, make_folder, readable_file, write_atomically
-from langflash_core.formats import is_film
+from langflash_core.formats import is_film, is_photo
 
 from ...films import look_through
 from ...renderers import open_renderer
@@ -65,7 +64,7 @@ def _frames(given: Path, progress: ProgressBar) -> list[Path]:
         InputError: there is neither. FilmError: the film cannot be used.
     """
     if given.is_dir():
-        return sorted(path for path in given.iterdir() if path.suffix.lower() in PHOTO_SUFFIXES)
+        return sorted(path for path in given.iterdir() if is_photo(path))
     if not is_film(given):
         raise InputError(f"{given} is neither a folder of frames nor a film; name one")
     readable_file(given, "film", ImageError)

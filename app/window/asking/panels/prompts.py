@@ -128,8 +128,8 @@ def _verdict(prompt: Prompt, look: Look) -> list[do.Command]:
     if widgets.quiet_button(f"{fa.ICON_FA_ROTATE_LEFT}##calibrated", "Back to the calibrated threshold"):
         issued.append(ask.SetThreshold(prompt.key, None))
     imgui.end_disabled()
-    if prompt.foreign:
-        widgets.muted("This reads like another language, or a rare word; phrases are understood in English.")
+    if prompt.note:
+        widgets.muted(f"{prompt.note[:1].upper()}{prompt.note[1:]}.".replace("?.", "?"))
     imgui.unindent(look.px(36))
     return issued
 

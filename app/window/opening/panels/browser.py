@@ -95,6 +95,8 @@ def _inside(state: State, folder: Folder, look: Look) -> list[do.Command]:
         issued += _photo(state, path, ImVec2(room / columns - gap, look.px(_CELL)), look)
     if folder.left_out:
         widgets.muted(f"and {folder.left_out} more; type the path of one of those")
+    if folder.unsaid:
+        widgets.muted(f"and {folder.unsaid} whose names are not UTF-8; rename those")
     if not (folder.folders or photos or films or scenes or folder.problem):
         widgets.muted(
             "No folder lies here." if state.dialog is Dialog.PLACE else "Nothing to open lies here."

@@ -17,7 +17,7 @@ from app.window.scene.panels import tray
 from app.window.scene.state import Photo
 from langflash_core.geometry.poses import Vector
 from langflash_core.language.answers import best_places
-from langflash_core.language.minilm import reads_foreign
+from langflash_core.language.hints import reads_foreign
 from langflash_core.language.spaces import language_space
 from langflash_core.resources import asset_path
 from langflash_core.scene.edited import first_marks
@@ -70,7 +70,9 @@ def test_another_language_is_told(text: str) -> None:
     assert reads_foreign(text)
 
 
-@pytest.mark.parametrize("text", ["armchair", "bookcases", "a red doormat", "café table", "tv", "", "12"])
+@pytest.mark.parametrize(
+    "text", ["armchair", "bookcases", "a red doormat", "café table", "tv", "", "12", "typewriter"]
+)
 def test_english_is_not(text: str) -> None:
     assert not reads_foreign(text)
 
@@ -81,10 +83,14 @@ def test_a_foreign_phrase_is_marked_with_its_compiled_question() -> None:
         1, scene, (4, 7, 9), ("stuhl", "chair", "haus"), (), (b"", b"", bytes(4 * 383) + b"\0\0\x80?")
     )
     (compiled,) = encode.run(lambda: False)
-    assert isinstance(compiled, ask.PhrasesCompiled) and compiled.foreign == (4,)
-    state = shown_scene().with_asking(prompts=(Prompt(4, "stuhl"), Prompt(7, "chair", foreign=True)))
+    assert isinstance(compiled, ask.PhrasesCompiled) and [bool(note) for note in compiled.notes] == [
+        True,
+        False,
+        False,
+    ]
+    state = shown_scene().with_asking(prompts=(Prompt(4, "stuhl"), Prompt(7, "chair", note="old")))
     state = after(state, compiled)
-    assert [prompt.foreign for prompt in state.asking.prompts] == [True, False]
+    assert [prompt.note for prompt in state.asking.prompts] == [compiled.notes[0], ""]
 
 
 def test_chips_are_what_the_scene_shows_most_of_each_once() -> None:

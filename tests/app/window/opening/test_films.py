@@ -173,6 +173,32 @@ def test_what_cannot_be_used_is_said(tmp_path: Path, walk: Path) -> None:
     )
 
 
+def test_a_scene_that_is_not_opened_is_said(tmp_path: Path, walk: Path) -> None:
+    """Scenes after the first, and one that comes with photos or a film, were passed over."""
+    scenes, photo = [tmp_path / "a.ply", tmp_path / "b.langflash"], tmp_path / "c.jpg"
+    for path in (*scenes, photo):
+        path.touch()
+    for given, said in (
+        (scenes, "Only a.ply was opened"),
+        ([scenes[1], photo], "b.langflash was not opened, for photos came with it"),
+        ([scenes[1], walk], "b.langflash was not opened, for a film came with it"),
+    ):
+        desk = Desk()
+        desk.perform(show.OpenPaths(tuple(map(str, given))))
+        assert said in desk.state.toasts[-1].text
+    desk = Desk()
+    desk.perform(show.OpenPaths((str(scenes[0]),)))
+    assert not desk.state.toasts
+
+
+def test_one_scene_at_a_time_is_chosen_to_be_merged(tmp_path: Path) -> None:
+    desk = Desk(shown_scene())
+    desk.perform(opening.LookInto(tmp_path, dialog=Dialog.MERGE))
+    for name in ("a.ply", "b.ply"):
+        desk.perform(opening.Choose(tmp_path / name))
+    assert desk.state.opening.chosen == (tmp_path / "b.ply",)
+
+
 def test_films_are_found(tmp_path: Path, walk: Path) -> None:
     (tmp_path / "a.MOV").touch()
     assert sort_drop([tmp_path]).films == ((tmp_path / "a.MOV").resolve(),)

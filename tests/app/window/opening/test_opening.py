@@ -1,19 +1,22 @@
 """Finding photos: folders, the clipboard, the desktop's dialog, and the empty window's commands."""
 
+import os
 from pathlib import Path
 from typing import Any
 
 import pytest
 from PIL import Image, ImageGrab
 
-from app.window.commands import Command, ShowDialog, ShowPicture, apply
+from app.window.commands import Command, EditDialogPath, ShowDialog, ShowPicture, apply
 from app.window.dialogs import Dialog
 from app.window.effects import Hands
 from app.window.opening import commands as opening
 from app.window.opening import effects, native, work
 from app.window.opening.panels.welcome import working
+from app.window.opening.pasted import pasted_paths
 from app.window.opening.state import MOST_FILES, Folder
 from app.window.scene import commands as show
+from app.window.scene.drops import sort_drop
 from app.window.state import State
 from langflash_core.errors import LangFlashError
 from tests.app.window.scenes import after, shown_scene
@@ -71,6 +74,10 @@ def test_a_large_folder_says_how_much_is_left_out(tmp_path: Path) -> None:
         (tmp_path / f"{place}.jpg").touch()
     found = work.listed(tmp_path)
     assert len(found.photos) == MOST_FILES and found.left_out == 5
+    for place in range(MOST_FILES + 3):
+        (tmp_path / f"folder {place}").mkdir()
+    found = work.listed(tmp_path)
+    assert len(found.folders) == MOST_FILES and found.left_out == 5 + 3
 
 
 def test_small_pictures_come_a_few_at_a_time_and_go_with_the_dialog(folder: Path, monkeypatch) -> None:
@@ -104,12 +111,87 @@ def test_pictures_of_a_folder_that_was_left_are_not_made(folder: Path) -> None:
 
 def test_paths_are_pasted(folder: Path) -> None:
     left, right = photo(folder / "a b.jpg"), folder / "b.jpg"
-    assert effects.pasted_paths(f"'{left}'\n{right}\n") == (str(left), str(right))
-    assert effects.pasted_paths(left.as_uri()) == (str(left),)
-    assert effects.pasted_paths(f"{left}\nsomething else") == () and effects.pasted_paths("") == ()
+    assert pasted_paths(f"'{left}'\n{right}\n") == (str(left), str(right))
+    assert pasted_paths(left.as_uri()) == (str(left),)
+    assert pasted_paths(f"{left}\nsomething else") == () and effects.pasted_paths("") == ()
     desk = Desk(clipboard=str(left))
     desk.perform(opening.Paste())
     assert show.OpenPaths((str(left),)) in desk.performed and not desk.asked
+
+
+def addresses(folder: Path, count: int) -> list[Path]:
+    folder = folder / "photos of a room, from the hall to the window"
+    folder.mkdir()
+    paths = [folder / f"2024-05-17 at noon, step {number:04d}.jpg" for number in range(count)]
+    for path in paths:
+        path.touch()
+    return paths
+
+
+@pytest.mark.parametrize("ends", ["\n", "\r\n"])
+def test_a_long_list_is_pasted_whole(tmp_path: Path, ends: str) -> None:
+    paths = addresses(tmp_path, 300)
+    text = ends.join(path.as_uri() for path in paths)
+    assert len(text) > 30_000
+    assert pasted_paths(text) == tuple(map(str, paths))
+    assert pasted_paths(ends.join(map(str, paths)) + ends) == tuple(map(str, paths))
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["it's.jpg", "'a'.jpg", "said 'yes'", " blanks ", "a#1?b;c.jpg", "100%25.jpg", "line\u2028end.jpg",
+     "\x85.jpg", "ä ö.jpg", "a\\b.jpg", "copy"],
+)  # fmt: skip
+def test_names_are_pasted_as_they_are(tmp_path: Path, name: str) -> None:
+    """Each was cut or changed, beside a file whose name is what was left of it."""
+    path, other = tmp_path / name, tmp_path / "other.jpg"
+    for each in (path, other, tmp_path / "a"):
+        each.touch()
+    for first in (
+        str(path),
+        path.as_uri(),
+        f"file:{path.as_uri()[7:]}",
+        f"file://localhost{path.as_uri()[7:]}",
+    ):
+        assert pasted_paths(f"{first}\n{other}") == (str(path), str(other)), first
+    assert pasted_paths(f"\"{path}\"\r\n'{other}'") == (str(path), str(other))
+
+
+def test_a_name_with_a_line_break_or_of_no_text_comes_as_an_address(tmp_path: Path) -> None:
+    broken, bytes_of = tmp_path / "a\nb.jpg", Path(os.fsdecode(bytes(tmp_path) + b"/caf\xe9.jpg"))
+    for path in (broken, bytes_of):
+        assert pasted_paths(path.as_uri()) == (str(path),)
+    assert pasted_paths(f"file://{tmp_path}/a#b.jpg") == (f"{tmp_path}/a#b.jpg",), (
+        "not every program encodes it"
+    )
+
+
+def test_what_file_managers_put_around_a_list(tmp_path: Path) -> None:
+    path = photo(tmp_path / "a b.jpg")
+    for heading in ("x-special/nautilus-clipboard\ncopy\n", "cut\n", "# made by hand\r\n"):
+        assert pasted_paths(f"{heading}{path.as_uri()}\n") == (str(path),)
+
+
+def test_what_is_not_there_is_said_and_the_rest_is_taken(tmp_path: Path) -> None:
+    """One of many that was moved away meanwhile; the whole list was no list then."""
+    here, gone = photo(tmp_path / "a.jpg"), tmp_path / "gone.jpg"
+    assert pasted_paths(f"{here}\n{gone.as_uri()}\n{gone}") == (str(here), str(gone), str(gone))
+    drop = sort_drop(pasted_paths(f"{here}\n{gone}"))
+    assert drop.photos == (here.resolve(),) and drop.rejected == (f"{gone} does not exist; check the path.",)
+
+
+def test_several_files_are_pasted_into_the_field_for_a_path(tmp_path: Path, monkeypatch) -> None:
+    """Its one line makes blanks of the ends of lines."""
+    monkeypatch.setattr(native, "is_there", lambda: False)
+    paths = addresses(tmp_path, 300)
+    desk = Desk(clipboard="\r\n".join(path.as_uri() for path in paths))
+    desk.perform(opening.OpenFiles())
+    desk.perform(EditDialogPath("  ".join(path.as_uri() for path in paths)))
+    assert desk.performed[-1] == show.OpenPaths(tuple(map(str, paths))) and desk.state.dialog is None
+    typed = Desk(clipboard=str(paths[0]))
+    typed.perform(opening.LookInto(tmp_path))
+    typed.perform(EditDialogPath(str(paths[0])))
+    assert typed.performed[-1] == EditDialogPath(str(paths[0])), "one path stays in the field"
 
 
 def test_a_picture_is_pasted_as_a_file_that_stays(folders: Path, monkeypatch) -> None:
