@@ -36,8 +36,8 @@ def to_json(record: Record) -> dict:
     known["camera_path"] = record.camera_path
     known["tour"] = record.tour
     known["antialiased"] = record.antialiased or None
-    known["edits"] = {"deleted": record.num_deleted} if record.num_deleted else None
     known["layered"] = record.layered or None
+    known["edits"] = {"deleted": record.num_deleted} if record.num_deleted else None
     written = {
         name: list(value) if isinstance(value, tuple) else value
         for name, value in known.items()
