@@ -181,7 +181,8 @@ class Record:
     back where they are written as doubles; None: nothing. counts: Gaussians predicted and left out. pruning:
     as `prune` left it. layered: every photo has a whole layer of its own (`splat.compose`). refinement: what
     a fit to the photos brought. detail: what was spent on how fine elements, and what it bought. light:
-    `gains` and `offsets`, a row of red, green and blue for each view, by which `scene.light` brought the photos' colours to one light. lens:
+    `gains` and `offsets`, a row of red, green and blue for each view, by which `scene.light`
+    brought the photos' colours to one light. lens:
     `found`, a mapping of `FoundLens` for each lens that the photos told. left_out:
     `shares`, of each view what was left out since the others do not show it (`scene.strangers`), `unplaced`,
     names of photos that could not be placed, and `films`, each with its name (`film`), how many `frames` were

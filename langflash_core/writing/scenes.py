@@ -11,7 +11,7 @@ from langflash_core.files import make_folder
 from langflash_core.formats import SOG_FOLDER, kind_of
 from langflash_core.fused import fused
 from langflash_core.level import upright
-from langflash_core.outputs import COMPRESSED, PLY, SCENE, SOG, SPZ, loaded
+from langflash_core.outputs import GLB, OPEN_USD, PLY, SCENE, SPLAT, loaded
 from langflash_core.scene.thin import coarse_level
 from langflash_core.types import Scene
 from langflash_core.writing.job import Job
