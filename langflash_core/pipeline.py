@@ -12,6 +12,7 @@ from langflash_core.ahead import Ahead
 from langflash_core.detail import DEFAULT_DETAIL
 from langflash_core.errors import InputError, PromptError, ViewError
 from langflash_core.export.html import Beside, Phrases, TextModel, write_html
+from langflash_core.fused import fused
 from langflash_core.images.decode import grey_photo
 from langflash_core.images.lens import Intrinsics
 from langflash_core.language.answers import answer
@@ -216,7 +217,7 @@ def web_page(
         InputError: a scene speaks another space than the first, or none that `with_text` reads.
         OutputError: the scene holds no Gaussians, or the path cannot be written.
     """
-    others = beside or {}
+    scene, others = fused(scene), {name: fused(other) for name, other in (beside or {}).items()}
     said = {other.semantics.space for other in (scene, *others.values())}
     if len(said) > 1:
         raise InputError(

@@ -247,3 +247,60 @@ def test_nothing_of_it_asks_for_gradients():
     weights = given.prediction.weights.clone().requires_grad_()
     scene, _ = made(replace(given, prediction=replace(given.prediction, weights=weights)))
     assert not scene.semantics.weight_values.requires_grad
+
+
+def layers_of(given: Photographed) -> Scene:
+    covered = covered_scene(
+        given.prediction, given.views, NORMAL, gaussians=None, preset="mini", layered=True
+    )
+    return coloured_scene(covered)
+
+
+def test_a_layer_shows_its_photo_at_its_place_better_than_one_surface_of_all(given, fine):
+    scene, (whole, _) = layers_of(given), fine
+    check_scene(scene)
+    assert scene.layered and len(scene.gaussians) > len(whole.gaussians)
+    for view in range(scene.num_views):
+        photo = given.photos[view]
+        assert difference(scene.layer(view), view, photo) > difference(whole, view, photo)
+
+
+def test_a_layer_keeps_what_the_other_photos_contradict():
+    given = with_somebody(photographed(), 1)
+    scene = layers_of(given)
+    assert not scene.record.left_out.get("shares")
+    drawn = render(scene.layer(1), scene.camera(1, 120, 90), weight_maps=False).rgb
+    red = torch.tensor([0.9, 0.1, 0.1])
+    assert float((drawn[20:76, 12:30] - red).abs().mean()) < 0.1  # .4 of the wall behind; edges aside
+
+
+def test_one_photo_is_no_layer():
+    given = photographed()
+    one = replace(
+        given.prediction,
+        **{
+            name: getattr(given.prediction, name)[:1]
+            for name in ("weights", "viewmats", "depths", "confidences")
+        },
+    )
+    views = replace(
+        given.views,
+        images=given.views.images[:1],
+        Ks=given.views.Ks[:1],
+        names=given.views.names[:1],
+        sources=given.views.sources[:1],
+    )
+    covered = covered_scene(one, views, NORMAL, gaussians=None, preset="mini", layered=True)
+    assert not coloured_scene(covered).layered
+
+
+def test_colours_of_layers_are_the_same_with_several_threads(given):
+    before = torch.get_num_threads()
+    try:
+        torch.set_num_threads(1)
+        one = layers_of(given)
+        torch.set_num_threads(2)
+        two = layers_of(given)
+    finally:
+        torch.set_num_threads(before)
+    assert torch.equal(one.gaussians.sh, two.gaussians.sh)

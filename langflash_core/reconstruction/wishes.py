@@ -48,6 +48,8 @@ class Wishes:
         check_gaussians(self.gaussians)
         if self.refine_seconds is not None:
             _check_refinement(self.refine_seconds, len(self.photos))
+            if self.layers:
+                raise InputError("a refinement fits one surface to all photos; leave it away, or the layers")
         return replace(self, device=device)
 
 
