@@ -104,13 +104,15 @@ def _numbers(values: Tensor) -> np.ndarray:
 
 
 def _own_scene(scene: Scene, view: int) -> Scene:
-    """The Gaussians that photo `view` made.
+    """The Gaussians that photo `view` made; of a layered scene its layer.
 
     Raises:
         ValueError: the scene does not say which.
     """
     if scene.view_ids is None:
         raise ValueError("view_ids: expected the photo that made each Gaussian, received none")
+    if scene.layered:
+        return scene.layer(view)
     return scene.rows(scene.view_ids == view)
 
 
@@ -121,7 +123,7 @@ def _depths(painter: Painter, splats: SplatBuffers, camera: Camera) -> np.ndarra
         splats.sort(camera)
     if len(splats.order):
         splats.project(camera)
-    draw_colour(painter.programs, splats, target.framebuffer)
+    draw_colour(painter.programs, [splats], target.framebuffer)
     sums = np.frombuffer(target.depth.read(), np.float32).reshape(camera.height, camera.width, 2)
     target.release()
     alphas = sums[..., 1]

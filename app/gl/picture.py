@@ -15,8 +15,10 @@ from langflash_core.splat.projection import ALPHA_MIN
 from langflash_core.types import Frame
 
 from .display import Answer, Drawn
+from .layered import LayeredLevel
+from .level import Level
 from .question import Question
-from .scene import Level, LiveScene
+from .scene import LiveScene
 from .targets import read
 from .view import ViewTargets
 from .weights import Maps
@@ -87,7 +89,7 @@ class Picture(ABC):
 class DrawnPicture(Picture):
     """What the last `draw` asked for, of a level as it stood then."""
 
-    level: Level
+    level: Level | LayeredLevel
     fast: bool
     span: tuple[float, float]
 
@@ -101,7 +103,7 @@ class DrawnPicture(Picture):
     @property
     def maps(self) -> Maps:
         """Its weight maps, drawn unless they are there."""
-        return self.view.maps.of(self.level)
+        return self.view.weight_maps(self.level)
 
     def weights(self, x: int, y: int) -> np.ndarray | None:
         there = self.view.maps.shows(self.level)

@@ -8,7 +8,8 @@ from langflash_core.language.relevance import CompiledQuery
 
 from .answers import MakeAnswers
 from .fast import MAX_PHRASES, splat_numbers
-from .scene import Level
+from .layered import MOVING
+from .level import Level
 
 _names = count(1)
 
@@ -20,7 +21,7 @@ class Question:
         self.compiled = compiled
         self.answers = answers
         self.key = next(_names)
-        self._numbers: tuple[Level, np.ndarray] | None = None
+        self._numbers: dict[Level, np.ndarray] = {}
 
     @property
     def num_phrases(self) -> int:
@@ -32,8 +33,13 @@ class Question:
         return self.compiled.factor.shape[0] > 0 and self.num_phrases <= MAX_PHRASES
 
     def numbers(self, level: Level) -> np.ndarray:
-        """What each Gaussian of a level carries in the fast mode (fast.py), (N, 3 L); kept for one level."""
-        if self._numbers is None or self._numbers[0] is not level:
+        """What each Gaussian of a level carries in the fast mode (fast.py), (N, 3 L); kept for the last two
+        levels: a moving picture is of two layers."""
+        numbers = self._numbers.pop(level, None)
+        if numbers is None:
             factor = self.compiled.factor.detach().cpu().double().numpy()
-            self._numbers = level, splat_numbers(level.splats, self.compiled, level.norms(factor))
-        return self._numbers[1]
+            numbers = splat_numbers(level.splats, self.compiled, level.norms(factor))
+        self._numbers[level] = numbers
+        while len(self._numbers) > MOVING:
+            self._numbers.pop(next(iter(self._numbers)))
+        return numbers

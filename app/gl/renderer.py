@@ -28,13 +28,15 @@ from .canvas import Canvas, Precision
 from .colours import hues
 from .display import MASK_STYLES, Answer, Background, Drawn
 from .hardware import Hardware
+from .layered import LayeredLevel
 from .layout import PHRASES_A_LAYER
+from .level import Level
 from .painter import Uniforms
 from .picture import DrawnPicture, Picture
 from .processor.still import Still
 from .processor.still_picture import StillPicture
 from .question import Question
-from .scene import Level, LiveScene, MakeSplats, Thinned
+from .scene import LiveScene, MakeSplats, Thinned
 from .splats import SplatBuffers
 from .targets import context_lives, read
 from .view import ViewTargets
@@ -156,6 +158,9 @@ class SplatRenderer:
     ) -> None:
         """Draw the scene; nothing is drawn again for the same scene, camera and size.
 
+        A layered scene is blended of the layers nearest to the camera (langflash_core/splat/compose.py);
+        `fast`, or a share of it, is the nearest layer over the next, which fills its holes.
+
         Args:
             weight_maps: draw them at once; else the first question that needs them does.
             fast: until the next call, answer from numbers splatted beside the colour (app/gl/fast.py)
@@ -168,14 +173,14 @@ class SplatRenderer:
             ValueError: there is no scene, or the image has no pixels.
             GraphicsError: the image is larger than the driver's textures, or the context is gone.
         """
-        scene, level, view = self._prepared(camera, share)
+        scene, level, view = self._prepared(camera, share, fast or share < 1)
         drawn = Drawn(view.colour, camera, background, level.places_key, self._fill)
-        picture = DrawnPicture(scene, view, drawn, level, fast, level.splats.depth_range)
+        picture = DrawnPicture(scene, view, drawn, level, fast, level.depth_range)
         if self._question is not None and fast and self._question.fits_fast:
             picture.answer(self._question)
         view.draw_colour(level)
         if weight_maps and not fast:
-            view.maps.of(level)
+            view.weight_maps(level)
         self._picture = picture
 
     def colours(self, camera: Camera, *, fade: bool = False, fill: bool = False) -> np.ndarray:
@@ -263,7 +268,8 @@ class SplatRenderer:
         """Make what this share of the Gaussians carries for the phrases in the fast mode now, not with the
         next picture."""
         if self._scene is not None and self._question is not None and self._question.fits_fast:
-            self._question.numbers(self._scene.level(share))
+            for part in self._scene.level(share).parts:
+                self._question.numbers(part)
 
     # --- numbers ------------------------------------------------------------------------------
 
@@ -443,7 +449,9 @@ class SplatRenderer:
 
     # --- inside -------------------------------------------------------------------------------
 
-    def _prepared(self, camera: Camera, share: float) -> tuple[LiveScene, Level, ViewTargets]:
+    def _prepared(
+        self, camera: Camera, share: float, moving: bool = False
+    ) -> tuple[LiveScene, Level | LayeredLevel, ViewTargets]:
         """What to draw, sorted and projected, and where.
 
         Raises:
@@ -455,7 +463,7 @@ class SplatRenderer:
             raise ValueError("draw: expected set_scene before, received no scene")
         view = self._canvas.view((camera.width, camera.height))
         level = self._scene.level(share)
-        level.prepare(camera)
+        level.prepare(camera, moving)
         return self._scene, level, view
 
     def _drawn(self) -> Picture:

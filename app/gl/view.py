@@ -1,20 +1,22 @@
 """What lives as long as the picture's size: colour, depth, weight maps, relevance, pictures to show."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 
+import moderngl
 import numpy as np
 
 from .answers import Answers, MakeAnswers
+from .blend import Blend
 from .colour import draw_colour
 from .display import Display
 from .fast import FastPasses
 from .layout import PHRASES_A_LAYER, num_groups
+from .level import Prepared
 from .packed import PackedMaps
 from .painter import Painter
 from .question import Question
-from .scene import Level
 from .targets import NUMPY_TYPES, ColourTarget, Layers, LayerTarget
-from .weights import MakeMaps, WeightMaps
+from .weights import MakeMaps, Maps, WeightMaps
 
 
 class ViewTargets:
@@ -41,22 +43,52 @@ class ViewTargets:
         self._shown = 0  # places in `colour`
         self._answers: dict[MakeAnswers, Answers] = {}
         self._fast: FastPasses | None = None
+        self._blend: Blend | None = None
         self._told = Layers(painter.ctx, size, "f4")
         self._tells = (0, 0)  # picture and question of `_told`
 
-    def draw_colour(self, level: Level) -> None:
+    def draw_colour(self, level: Prepared) -> None:
         """Colour and depth of the level as it stands, unless they are there."""
         if self._shown == level.places_key:
             return
-        draw_colour(self._painter.programs, level.splats, self.colour.framebuffer)
-        self._painter.passes["colour"] += 1
+        if level.weights is None:
+            self._splat(level, self.colour.framebuffer)
+        else:
+            self._blended(level)
         self._shown = level.places_key
 
-    def colours(self, level: Level) -> np.ndarray:
+    def _splat(
+        self,
+        level: Prepared,
+        into: moderngl.Framebuffer,
+        numbers: Sequence[np.ndarray] | None = None,
+        depth: bool = True,
+    ) -> None:
+        splats = [part.splats for part in level.parts]
+        draw_colour(self._painter.programs, splats, into, numbers, depth)
+        self._painter.passes["colour"] += len(splats)
+
+    def _blended(self, level: Prepared) -> None:
+        if self._blend is None:
+            self._blend = Blend(self._painter, self.colour, self._dtype)
+        self._blend.draw(level)
+        self._painter.passes["colour"] += len(level.parts)
+
+    def weight_maps(self, level: Prepared) -> Maps:
+        """Those of the level as it stands, drawn unless they are there."""
+        if self.maps.shows(level) or level.weights is None:
+            return self.maps.of(level)
+        self.draw_colour(level)  # tells what each part counts
+        assert self._blend is not None
+        return self.maps.of(level, self._blend.shares)
+
+    def colours(self, level: Prepared) -> np.ndarray:
         """(H, W, 3) uint8, the colour alone over black; what was drawn here before is gone."""
         self._shown = 0
-        draw_colour(self._painter.programs, level.splats, self.colour.alone, depth=False)
-        self._painter.passes["colour"] += 1
+        if level.weights is None:
+            self._splat(level, self.colour.alone, depth=False)
+        else:
+            self._blended(level)
         width, height = self.size
         texels = self.colour.alone.read(components=3, alignment=1, dtype="f1")
         return np.frombuffer(texels, np.uint8).reshape(height, width, 3)
@@ -81,18 +113,17 @@ class ViewTargets:
             self._tells = key, question.key
         return told
 
-    def exact(self, question: Question, level: Level) -> LayerTarget:
+    def exact(self, question: Question, level: Prepared) -> LayerTarget:
         """Relevance from the weight maps, which are drawn unless they are there."""
-        return self.answers(question.answers).run(question.compiled, self.maps.of(level))
+        return self.answers(question.answers).run(question.compiled, self.weight_maps(level))
 
-    def fast(self, question: Question, level: Level) -> LayerTarget:
-        """Relevance from numbers beside the colour: all three in one splat pass, unless they are there."""
+    def fast(self, question: Question, level: Prepared) -> LayerTarget:
+        """Relevance from numbers beside the colour: all three in one splat pass of each part, one over the
+        other, unless they are there."""
         passes = self.fast_passes(question.num_phrases)
         shown = (level.places_key, question.key)
         if passes.shows != shown:
-            numbers = question.numbers(level)
-            draw_colour(self._painter.programs, level.splats, passes.framebuffer, numbers)
-            self._painter.passes["colour"] += 1
+            self._splat(level, passes.framebuffer, [question.numbers(part) for part in level.parts])
             self._shown, passes.shows = level.places_key, shown
             passes.run(question.compiled)
         return passes.relevance
@@ -132,5 +163,8 @@ class ViewTargets:
             answers.release()
         self._answers.clear()
         self._release_fast()
+        if self._blend is not None:
+            self._blend.release()
+        self._blend = None
         for owned in (self._told, self.display, self.packed, self.maps, self.colour):
             owned.release()

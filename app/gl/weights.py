@@ -3,15 +3,17 @@ on a processor cell by cell (processor/cell_maps.py), read back on request."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import reduce
 
 import moderngl
 import numpy as np
 
 from langflash_core.graphics import set_uniforms
 
+from .blend import add_maps
 from .layout import ATOMS_A_LAYER, ATOMS_A_PASS, LAYERS_A_PASS, num_layers
+from .level import Prepared
 from .painter import Painter
-from .scene import Level
 from .splats import SplatBuffers
 from .targets import PREMULTIPLIED, Layers, LayerTarget, drawing, read
 
@@ -62,35 +64,63 @@ class WeightMaps:
         self.size = size
         self.layers = Layers(painter.ctx, size, dtype)
         self._maps: Maps | None = None
+        self._own = Layers(painter.ctx, size, dtype)  # of one part of a level that is blended
 
-    def shows(self, level: Level) -> bool:
+    def shows(self, level: Prepared) -> bool:
         """Whether the maps are those of the level as it stands."""
         return self._maps is not None and self._maps.version == level.order_key
 
-    def of(self, level: Level) -> Maps:
-        """The maps of the level as it stands, drawn unless they are there."""
+    def of(self, level: Prepared, shares: moderngl.Texture | None = None) -> Maps:
+        """The maps of the level as it stands, drawn unless they are there.
+
+        Args:
+            shares: of a level that is blended, what each part counts in each pixel.
+        """
         if self._maps is None or self._maps.version != level.order_key:
-            self._maps = self.draw(level)
+            self._maps = self.draw(level, shares)
         return self._maps
 
-    def draw(self, level: Level) -> Maps:
+    def draw(self, level: Prepared, shares: moderngl.Texture | None) -> Maps:
         """Of the atoms in view, in passes of `layout.ATOMS_A_PASS`."""
-        atoms = level.splats.active_atoms()
+        atoms = reduce(np.union1d, [part.splats.active_atoms() for part in level.parts])
         whole_passes = -(-len(atoms) // ATOMS_A_PASS) * LAYERS_A_PASS
         layers = self.layers.at_least(max(1, whole_passes))
         for first in range(0, len(atoms), ATOMS_A_PASS):
-            self._draw(level.splats, layers, atoms, first)
+            count = num_layers(min(ATOMS_A_PASS, len(atoms) - first))
+            target = layers.layers(first // ATOMS_A_LAYER, count)
+            target.clear()
+            if shares is None:
+                for part in reversed(level.parts):
+                    self._draw(part.splats, target, atoms, first, count)
+            else:
+                self._add(level, shares, target, atoms, first, count)
         return Maps(layers, atoms, level.order_key)
 
-    def _draw(self, splats: SplatBuffers, layers: LayerTarget, atoms: np.ndarray, first: int) -> None:
-        """One pass, of the atoms from place `first` on."""
-        count = num_layers(min(ATOMS_A_PASS, len(atoms) - first))
+    def _add(
+        self,
+        level: Prepared,
+        shares: moderngl.Texture,
+        target: moderngl.Framebuffer,
+        atoms: np.ndarray,
+        first: int,
+        count: int,
+    ) -> None:
+        """One pass of each part, and what it counts of that."""
+        own = self._own.at_least(LAYERS_A_PASS)
+        for place, part in enumerate(level.parts):
+            alone = own.layers(0, count)
+            alone.clear()
+            self._draw(part.splats, alone, atoms, first, count)
+            add_maps(self.painter, own, count, shares, place, target)
+
+    def _draw(
+        self, splats: SplatBuffers, target: moderngl.Framebuffer, atoms: np.ndarray, first: int, count: int
+    ) -> None:
+        """One pass, of `count` layers of the atoms from place `first` on, over what is there."""
         expanded = splats.expand(atoms, first, count)
         defines = {"LAYERS": count, **splats.shapes.defines}
         program = self.painter.programs.get("quad.vert", "weights.frag", defines)
         set_uniforms(program, image_size=tuple(float(n) for n in self.size))
-        target = layers.layers(first // ATOMS_A_LAYER, count)
-        target.clear()
         with drawing(target, PREMULTIPLIED):
             splats.draw(program, expanded, count, colour=False)
         self.painter.passes["weights"] += 1
@@ -98,6 +128,7 @@ class WeightMaps:
     def release(self) -> None:
         """Give the layers back; whoever asks for maps draws them anew."""
         self.layers.release()
+        self._own.release()
         self._maps = None
 
 

@@ -26,6 +26,9 @@ def thin(scene: Scene, share: float) -> Scene:
     the nearest coarse one's: what changes the picture most. A share of `coarse_share` is the coarse ones
     alone, a smaller one these thinned as a scene of their own.
 
+    Of a scene of layers each is thinned for itself, so that it stays closed: the curve goes through one layer
+    after the other, and detail is compared with the coarse ones of its own.
+
     Args:
         share: in (0, 1].
 
@@ -51,7 +54,7 @@ def thin_with_rows(scene: Scene, share: float) -> tuple[Scene, Int[np.ndarray, "
     if coarse < 1:
         return _leveled(scene, share, coarse)
     chances = inclusion(covered_areas(scene.gaussians), share * len(scene.gaussians))
-    rows = np.sort(_drawn(chances, scene.gaussians))
+    rows = np.sort(_drawn(chances, scene))
     kept = torch.from_numpy(rows)
     growth = torch.from_numpy(chances[rows] ** -0.5).to(scene.gaussians.scales)
     thinned = scene.rows(kept)
@@ -77,9 +80,16 @@ def _leveled(scene: Scene, share: float, coarse: float) -> tuple[Scene, np.ndarr
     if share <= coarse:
         thinned, some = thin_with_rows(scene.rows(torch.from_numpy(closed)), share / coarse)
         return thinned, closed[some]
-    tells = _told(*(scene.gaussians.rows(torch.from_numpy(rows)) for rows in (closed, detail)))
+    fine = scene.rows(torch.from_numpy(detail))
+    tells = np.zeros(len(detail))
+    for part in _layers(scene):
+        own = part[detail]
+        tells[own] = _told(
+            scene.gaussians.rows(torch.from_numpy(closed[part[closed]])),
+            fine.gaussians.rows(torch.from_numpy(own)),
+        )
     chances = inclusion(tells, share * len(levels) - len(closed))
-    chosen = detail[_drawn(chances, scene.gaussians.rows(torch.from_numpy(detail)))]
+    chosen = detail[_drawn(chances, fine)]
     rows = np.sort(np.concatenate((closed, chosen)))
     return scene.rows(torch.from_numpy(rows)), rows
 
@@ -99,9 +109,19 @@ def _told(coarse: Gaussians, detail: Gaussians) -> np.ndarray:
     return tells
 
 
-def _drawn(chances: np.ndarray, gaussians: Gaussians) -> np.ndarray:
+def _layers(scene: Scene) -> list[np.ndarray]:
+    """(N,) bool of each layer; of a scene that has none, all."""
+    if not scene.layered or scene.view_ids is None:
+        return [np.ones(len(scene.gaussians), bool)]
+    views = scene.view_ids.cpu().numpy()
+    return [views == view for view in np.unique(views)]
+
+
+def _drawn(chances: np.ndarray, scene: Scene) -> np.ndarray:
     """Rows that one draw along a space-filling curve keeps, each with its chance (N,)."""
-    along = z_order(gaussians.means.detach().cpu().numpy())
+    along = z_order(scene.gaussians.means.detach().cpu().numpy())
+    if scene.layered and scene.view_ids is not None:
+        along = along[np.argsort(scene.view_ids.cpu().numpy()[along], kind="stable")]
     ends = np.floor(np.cumsum(chances[along]) + 1e-9)
     return along[np.diff(ends, prepend=0.0) > 0]
 

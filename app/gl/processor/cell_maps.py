@@ -11,10 +11,10 @@ from langflash_core.graphics import set_uniforms
 from ..buffers import Growing
 from ..carried import bytes_of
 from ..layout import ATOMS_A_LAYER, ATOMS_A_PASS, LAYERS_A_PASS, num_layers
+from ..level import Prepared
 from ..painter import Painter
-from ..scene import Level
 from ..splats import SplatBuffers
-from ..targets import PREMULTIPLIED, Layers, drawing
+from ..targets import PREMULTIPLIED, Layers, LayerTarget, drawing
 from ..weights import Maps, WeightMaps
 from .cells import Batch, Cells, batches, cells_of, together
 from .sprites import Sprites
@@ -23,21 +23,27 @@ _SPLATS_AT_ONCE = 1 << 17  # of cells: 13 MB of weights
 
 
 class CellMaps(WeightMaps):
-    """As `WeightMaps`; whole where there are no sprites, or splats and cells make too many pairs."""
+    """As `WeightMaps`; whole where there are no sprites, or several parts, or splats and cells make too many
+    pairs."""
 
     def __init__(self, painter: Painter, size: tuple[int, int], dtype: str):
         super().__init__(painter, size, dtype)
         self._cells = Layers(painter.ctx, size, dtype)
         self._stream = Stream(painter.ctx)
 
-    def draw(self, level: Level) -> Maps:
-        sprites = level.splats.shapes
-        if not isinstance(sprites, Sprites) or sprites.footprints is None:
-            return super().draw(level)
-        cells = cells_of(sprites.footprints.boxes(), partial(_atoms_of, level.splats), self.size)
-        return super().draw(level) if cells is None else self._drawn_in(cells, level, sprites)
+    def draw(self, level: Prepared, shares: moderngl.Texture | None) -> Maps:
+        splats = level.parts[0].splats
+        sprites = splats.shapes
+        if len(level.parts) > 1 or not isinstance(sprites, Sprites) or sprites.footprints is None:
+            return super().draw(level, shares)
+        cells = cells_of(sprites.footprints.boxes(), partial(_atoms_of, splats), self.size)
+        if cells is None:
+            return super().draw(level, shares)
+        return Maps(*self._drawn_in(cells, splats, sprites), level.order_key)
 
-    def _drawn_in(self, cells: Cells, level: Level, sprites: Sprites) -> Maps:
+    def _drawn_in(
+        self, cells: Cells, splats: SplatBuffers, sprites: Sprites
+    ) -> tuple[LayerTarget, np.ndarray]:
         """Cells that need as many layers are drawn beside each other, into the first ones of an array for
         that, and go from there to their atoms' layers: a framebuffer for each cell leaves all processors but
         one without work."""
@@ -47,12 +53,12 @@ class CellMaps(WeightMaps):
         for first in range(0, num_layers(len(atoms)), LAYERS_A_PASS):
             layers.layers(first, LAYERS_A_PASS).clear()
         for batch in batches(cells.atoms, atoms, layers.num_layers):
-            self._draw_batch(level.splats, sprites, cells, batch, batch.slots(atoms, cells.atoms.shape[1]))
+            self._draw_batch(splats, sprites, cells, batch, batch.slots(atoms, cells.atoms.shape[1]))
             boxes = cells.boxes[batch.cells].tolist()
             for place, chosen in enumerate(batch.layers.T.tolist()):
                 self._cells.at_least(1).copy(place, layers, zip(boxes, chosen, strict=True))
         self.painter.passes["weights"] += passes
-        return Maps(layers, atoms, level.order_key)
+        return layers, atoms
 
     def _draw_batch(
         self, splats: SplatBuffers, sprites: Sprites, cells: Cells, batch: Batch, slots: np.ndarray

@@ -18,6 +18,7 @@ from torch import Tensor
 
 from langflash_core.errors import Cancelled
 from langflash_core.language.relevance import EMPTY_NORM, CompiledQuery
+from langflash_core.splat.compose import Nearness, shares
 from langflash_core.splat.projection import (
     ALPHA_MIN,
     NEAR,
@@ -176,32 +177,97 @@ def draw_still(
         Cancelled: `stopping` said so.
     """
 
-    def go_on() -> None:
-        if stopping():
+    order = _Order(scene, camera, marks, weight_maps, carried, threads, stopping)
+    chosen = Nearness.of(scene).chosen(camera) if scene.layered else None
+    kept = order.kept()
+    if chosen is None or not chosen.views:
+        drawn = order.splatted(kept)
+    else:
+        assert scene.view_ids is not None
+        ids = scene.view_ids.cpu()
+        layers = [order.splatted(kept & ((ids == view) | (ids < 0))) for view in chosen.views]
+        drawn = layers[0] if len(layers) == 1 else _blended(layers, chosen.weights)
+    colour = torch.cat((drawn.colours[..., :3], drawn.alphas[..., None]), -1).half().numpy()
+    depth = torch.stack((drawn.colours[..., 3], drawn.alphas), -1).numpy()
+    still = None if drawn.maps is None else StillMaps(drawn.maps)
+    return Still(camera, colour, depth, drawn.depth_range or (NEAR, 1.0), still)
+
+
+@dataclass(frozen=True)
+class _Splatted:
+    """colours: (H, W, 4) float32, premultiplied, and the sum of T alpha z. alphas: (H, W). maps: (H, W, F)
+    float16. depth_range: as `Still` has it; None where nothing is in view."""
+
+    colours: Tensor
+    alphas: Tensor
+    maps: Tensor | None
+    depth_range: tuple[float, float] | None
+
+
+@dataclass(frozen=True)
+class _Order:
+    """What `draw_still` is to draw; Gaussians of it are splatted together by `splatted`."""
+
+    scene: Scene
+    camera: Camera
+    marks: tuple[np.ndarray, np.ndarray] | None
+    weight_maps: bool
+    carried: Tensor | None
+    threads: int
+    stopping: Callable[[], bool]
+
+    def kept(self) -> Tensor:
+        """(N,) bool, of the Gaussians that can be drawn and are to be shown."""
+        kept = drawable_rows(self.scene)
+        return kept if self.marks is None else kept & torch.from_numpy(self.marks[0])
+
+    def splatted(self, kept: Tensor) -> _Splatted:
+        """A picture of some Gaussians (N,) bool.
+
+        Raises:
+            as `draw_still`.
+        """
+        gaussians = self.scene.gaussians.map(lambda v: v.detach()[kept])
+        self._go_on()
+        footprints = _footprints(gaussians, self.camera, self._go_on)
+        colours = view_colours(gaussians, self.camera).float().clamp_max(_HALF_MAX)
+        if self.marks is not None:
+            colours = _tinted(colours, torch.from_numpy(self.marks[1])[kept])
+        depths = torch.zeros(len(gaussians)).index_copy(0, footprints.ids, footprints.depths.float())
+        features = [torch.cat((colours, depths[:, None]), -1)]
+        if self.weight_maps:
+            if self.carried is None:
+                features.append(_sparse_in_half(self.scene.semantics.rows(kept)))
+            else:
+                features.append(self.carried.detach()[kept].half())
+            self._go_on()
+        maps, alphas = rasterize_tiles(
+            footprints, features, self.camera, threads=self.threads, stopping=self.stopping
+        )
+        return _Splatted(maps[0], alphas, maps[1] if self.weight_maps else None, _middle(footprints.depths))
+
+    def _go_on(self) -> None:
+        if self.stopping():
             raise Cancelled("the picture is no longer wanted")
 
-    kept = drawable_rows(scene)
-    if marks is not None:
-        kept &= torch.from_numpy(marks[0])
-    gaussians = scene.gaussians.map(lambda v: v.detach()[kept])
-    go_on()
-    footprints = _footprints(gaussians, camera, go_on)
-    colours = view_colours(gaussians, camera).float().clamp_max(_HALF_MAX)
-    if marks is not None:
-        colours = _tinted(colours, torch.from_numpy(marks[1])[kept])
-    depths = torch.zeros(len(gaussians)).index_copy(0, footprints.ids, footprints.depths.float())
-    features = [torch.cat((colours, depths[:, None]), -1)]
-    if weight_maps:
-        if carried is None:
-            features.append(_sparse_in_half(scene.semantics.rows(kept)))
-        else:
-            features.append(carried.detach()[kept].half())
-        go_on()
-    maps, alphas = rasterize_tiles(footprints, features, camera, threads=threads, stopping=stopping)
-    colour = torch.cat((maps[0][..., :3], alphas[..., None]), -1).half().numpy()
-    depth = torch.stack((maps[0][..., 3], alphas), -1).numpy()
-    still = StillMaps(maps[1]) if weight_maps else None
-    return Still(camera, colour, depth, _middle(footprints.depths), still)
+
+def _blended(layers: list[_Splatted], weights: np.ndarray) -> _Splatted:
+    """One picture of those of layers (langflash_core/splat/compose.py); its maps go into the first's."""
+    alphas = torch.stack([layer.alphas for layer in layers])
+    sums = torch.stack([layer.colours[..., 3] for layer in layers])
+    b = shares(alphas, torch.where(alphas >= ALPHA_MIN, sums / alphas.clamp_min(ALPHA_MIN), 0.0), weights)
+    colours = torch.zeros_like(layers[0].colours)
+    for own, layer in zip(b, layers, strict=True):
+        colours += own[..., None] * layer.colours
+    maps = [layer.maps for layer in layers if layer.maps is not None]
+    for row in range(len(alphas[0]) if maps else 0):  # of pixels, in float32: no picture twice
+        mixed = torch.zeros(maps[0].shape[1:])
+        for own, each in zip(b[:, row], maps, strict=True):
+            mixed += own[:, None] * each[row]
+        maps[0][row] = mixed
+    ranges = [layer.depth_range for layer in layers if layer.depth_range is not None]
+    seen = (min(near for near, _ in ranges), max(far for _, far in ranges)) if ranges else None
+    return _Splatted(colours, (b * alphas).sum(0), maps[0] if maps else None, seen)
 
 
 def _footprints(gaussians: Gaussians, camera: Camera, go_on: Callable[[], None]) -> Footprints:
@@ -230,10 +296,10 @@ def _sparse_in_half(semantics: Semantics) -> Tensor:
     return replace(semantics, weight_values=values).dense_weights()
 
 
-def _middle(depths: Tensor) -> tuple[float, float]:
-    """Near and far (n,) of the middle 96 % of the Gaussians in view, nearest first."""
+def _middle(depths: Tensor) -> tuple[float, float] | None:
+    """Near and far (n,) of the middle 96 % of the Gaussians in view, nearest first; None of none."""
     if not len(depths):
-        return (NEAR, 1.0)
+        return None
     margin = len(depths) // 50
     return (float(depths[margin]), float(depths[-1 - margin]))
 

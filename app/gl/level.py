@@ -1,0 +1,116 @@
+"""A share of a scene's Gaussians, ordered and projected, and what a view asks of one that it draws."""
+
+from collections.abc import Sequence
+from itertools import count
+from typing import Protocol
+
+import numpy as np
+import torch
+
+from langflash_core.scene.changed import changed
+from langflash_core.scene.changes import Change
+from langflash_core.types import Camera, Gaussians
+
+from .splats import SplatBuffers
+
+_names = count(1)  # each given once, so that no two contents are ever taken for each other
+
+
+class Prepared(Protocol):
+    """What a view draws: parts, each splatted into a picture of its own and blended by `weights`
+    (langflash_core/splat/compose.py), or without these all into one, the first over the next.
+
+    `order_key` names the Gaussians and their order, `places_key` also their footprints and colours:
+    what was drawn from another order or other places shows another key.
+    """
+
+    @property
+    def parts(self) -> "Sequence[Level]": ...
+
+    @property
+    def weights(self) -> np.ndarray | None:
+        """(L,), of so many parts, in sum 1."""
+        ...
+
+    @property
+    def order_key(self) -> int: ...
+
+    @property
+    def places_key(self) -> int: ...
+
+
+class Level:
+    """A share of a scene's Gaussians, ordered and projected for one camera at a time; its only part."""
+
+    weights: np.ndarray | None = None
+
+    def __init__(self, splats: SplatBuffers, rows: np.ndarray, gaussians: Gaussians):
+        """rows: of the scene's N Gaussians, that this level draws. gaussians: as it draws them."""
+        self.splats = splats
+        self.order_key = self.places_key = 0
+        self._rows = rows
+        self._gaussians = gaussians
+        self._changes: tuple[Change, ...] | None = None  # to be brought to the card
+        self._camera: tuple | None = None  # that the Gaussians are ordered for
+        self._projected = False
+        self._norms: tuple[bytes, np.ndarray] | None = None  # factor and |f_i|
+
+    @property
+    def parts(self) -> "tuple[Level, ...]":
+        return (self,)
+
+    def prepare(self, camera: Camera, moving: bool = False) -> None:
+        """Order and project the Gaussians, unless they are for this camera and these marks; in a moving
+        picture too."""
+        if self._changes is not None:
+            self.splats.place(changed(self._gaussians, self._changes, torch.from_numpy(self._rows)))
+            self._changes = None
+        key = _camera_key(camera)
+        if key != self._camera:
+            self.splats.sort(camera)
+            self._camera, self._projected, self.order_key = key, False, new_name()
+        if not self._projected:
+            if len(self.splats.order):
+                self.splats.project(camera)
+            self._projected, self.places_key = True, new_name()
+
+    def mark(self, shown: np.ndarray, tints: np.ndarray) -> None:
+        """Bring the scene's marks to this level: shown (N,) bool, tints (N,) uint8."""
+        if self.splats.mark(shown[self._rows], tints[self._rows]):
+            self._camera = None
+        self._projected = False
+
+    def change(self, changes: tuple[Change, ...]) -> None:
+        """Draw the Gaussians as edits moved and recoloured them, from the next picture on."""
+        self._changes, self._camera = changes, None
+
+    @property
+    def depth_range(self) -> tuple[float, float]:
+        """Depths of the middle 96 % of the Gaussians in view, scene units."""
+        return self.splats.depth_range
+
+    def norms(self, factor: np.ndarray) -> np.ndarray:
+        """|f_i| (N,) of the level's Gaussians over a dictionary with factor R (K, r); kept for the last R."""
+        named = factor.tobytes()
+        if self._norms is None or self._norms[0] != named:
+            self._norms = named, np.linalg.norm(self.splats.carried.mixed(factor), axis=1)
+        return self._norms[1]
+
+    def forget(self) -> None:
+        """Order and project anew for the next picture."""
+        self._camera = None
+
+    def release(self) -> None:
+        """Give every buffer back."""
+        self.splats.release()
+
+
+def new_name() -> int:
+    """A key that no content has yet."""
+    return next(_names)
+
+
+def _camera_key(camera: Camera) -> tuple:
+    pose, K = (m.detach().cpu().double().numpy().tobytes() for m in (camera.viewmat, camera.K))
+    light = None if camera.light is None else camera.light.cpu().numpy().tobytes()
+    return pose, K, camera.width, camera.height, camera.orthographic, light

@@ -1,0 +1,454 @@
+"""Scenes of layers, blended as langflash_core/splat/compose.py has it: at rest, moving, beside the window."""
+
+from dataclasses import replace
+from itertools import pairwise
+
+import numpy as np
+import pytest
+import torch
+
+from app.gl import SplatRenderer
+from app.gl.layered import KEPT, LayeredLevel
+from app.gl.processor.still import draw_still
+from langflash_core.errors import Cancelled
+from langflash_core.geometry.cameras import invert_rigid
+from langflash_core.records import Record
+from langflash_core.scene.changed import changed
+from langflash_core.scene.changes import Moved, Recoloured
+from langflash_core.scene.mask import Mask
+from langflash_core.scene.thin import thin_with_rows
+from langflash_core.splat import compose, reference
+from langflash_core.types import Camera, Scene, Semantics
+from tests.app.gl.questions import full_relevance, psnr, question
+from tests.splat.scenes import camera, cloud, maps_of, turned
+
+# As in test_gl_against_reference.py, which says why: layers are drawn as there, and a blend is a mean of them.
+# What a layer counts comes of float32 depths: an error of 1e-6 changes a support by 1e-6 / DEPTH at most.
+PSNR = {"float16": 50.0, "float32": 80.0}
+WEIGHT_ERROR = {"float16": 2e-3, "float32": 2e-5}
+RELEVANCE_ERROR = {"float16": 2e-3, "float32": 1e-4}
+NUM_VIEWS = [1, 2, 3, 6]
+
+
+def layered(num_views: int, count: int = 400, num_atoms: int = 30, unowned: int = 40) -> Scene:
+    """A layer before each of some photos in a row, and some Gaussians that no photo made; a gap in the second
+    layer. Surfaces of a wall: layers agree where they overlap, but for a few far before it."""
+    parts, poses, views = [], [], []
+    for view in range(num_views):
+        more = unowned if view == 0 else 0
+        made = cloud(count + more, num_atoms, size=0.08, seed=view, dtype=torch.float32)
+        pose = turned(0.04 * view, (-0.12 * view, 0.0, 0.0))
+        means = made.gaussians.means.double()
+        wall = 2 + 0.1 * means[:, 2:] + 0.02 * view
+        near = torch.arange(len(means))[:, None] % 10 == 0
+        means = torch.where(near, means, means * wall / means[:, 2:])
+        back = invert_rigid(pose)
+        means = means @ back[:3, :3].T + back[:3, 3]
+        parts.append(replace(made, gaussians=replace(made.gaussians, means=means.float())))
+        poses.append(pose)
+        ids = torch.full((len(means),), view)
+        ids[count:] = -1
+        views.append(ids)
+    ids = torch.cat(views)
+    first = parts[0]
+    fields = ("means", "quats", "scales", "opacities", "sh")
+    gaussians = type(first.gaussians)(*(torch.cat([getattr(p.gaussians, f) for p in parts]) for f in fields))
+    semantics = Semantics(
+        torch.cat([p.semantics.weight_ids for p in parts]),
+        torch.cat([p.semantics.weight_values for p in parts]),
+        first.semantics.dictionary,
+        "test",
+    )
+    gap = (ids == 1) & (gaussians.means[:, 0] > 0.3)
+    scene = Scene(
+        gaussians,
+        semantics,
+        torch.stack(poses).float(),
+        first.Ks.float().expand(num_views, 3, 3),
+        first.view_size,
+        view_ids=ids,
+        record=Record(layered=True),
+    )
+    return scene.rows(~gap)
+
+
+def between(num_views: int) -> Camera:
+    """Between the photos, off their row."""
+    middle = (num_views - 1) / 2 + 0.2
+    return camera(96, 80, 80.0, turned(0.04 * middle, (-0.12 * middle, 0.03, 0.05)))
+
+
+def doubled(scene: Scene) -> Scene:
+    semantics = scene.semantics
+    values, atoms = semantics.weight_values.double(), semantics.dictionary.double()
+    return replace(
+        scene,
+        gaussians=scene.gaussians.map(lambda v: v.double()),
+        semantics=replace(semantics, weight_values=values, dictionary=atoms),
+    )
+
+
+@pytest.fixture(params=["float16", "float32"])
+def precision(request):
+    return request.param
+
+
+@pytest.mark.parametrize("num_views", NUM_VIEWS)
+def test_a_picture_is_blended_as_the_reference_has_it(gl, precision, num_views):
+    scene, seen = layered(num_views), between(num_views)
+    expected = compose.render(doubled(scene), seen, background=(0.2, 0.4, 0.9))
+    fused = reference.render(doubled(scene), seen, background=(0.2, 0.4, 0.9))
+    assert num_views == 1 or psnr(fused.rgb, expected.rgb) < 35, "blending must be another picture"
+    renderer = SplatRenderer(gl, precision)
+    renderer.set_scene(scene)
+    renderer.draw(seen, background=(0.2, 0.4, 0.9))
+    frame = renderer.frame(weight_maps=True)
+    renderer.release()
+    assert expected.alphas.mean() > 0.5
+    assert psnr(frame.rgb, expected.rgb) >= PSNR[precision]
+    assert psnr(frame.alphas, expected.alphas) >= PSNR[precision]
+    solid = expected.alphas > 0.5
+    assert ((frame.depths - expected.depths).abs()[solid] / expected.depths[solid]).mean() <= 1e-5
+    assert (maps_of(frame) - maps_of(expected)).abs().mean() <= WEIGHT_ERROR[precision]
+    # Weights of a Gaussian are in sum 1, and stay so when blended; K errors add up.
+    assert (maps_of(frame).sum(-1) - expected.alphas).abs().mean() <= 10 * WEIGHT_ERROR[precision]
+
+
+@pytest.mark.parametrize("num_views", NUM_VIEWS)
+@pytest.mark.usefixtures("queries")
+def test_relevance_of_the_blend_is_the_references(gl, precision, num_views):
+    scene, seen = layered(num_views), between(num_views)
+    expected = maps_of(compose.render(doubled(scene), seen))
+    renderer = SplatRenderer(gl, precision)
+    renderer.set_scene(scene)
+    renderer.draw(seen)
+    for mode in ("relevancy", "cosine"):
+        compiled = question(scene, 5, mode)
+        renderer.ask(compiled)
+        error = (renderer.relevance() - full_relevance(scene, compiled, expected)).abs()
+        assert error.mean() <= RELEVANCE_ERROR[precision]
+    renderer.release()
+
+
+def test_what_layers_count_is_in_sum_one_where_anything_shows(renderer):
+    scene, seen = layered(3), between(3)
+    renderer.set_scene(scene)
+    renderer.draw(seen)
+    blend = renderer.canvas.view((96, 80))._blend
+    shares = np.frombuffer(blend.shares.read(), np.float32).reshape(80, 96, 4)
+    covered = np.zeros((80, 96), bool)
+    for layer in blend._layers:
+        covered |= np.frombuffer(layer.depth.read(), np.float32).reshape(80, 96, 2)[..., 1] > 0
+    assert covered.any() and not shares[~covered].any() and not shares[..., 3].any()
+    assert np.abs(shares.sum(-1)[covered] - 1).max() <= 1e-6  # three quotients in float32
+    assert shares.min() >= 0 and all(np.ptp(shares[..., i]) > 0.5 for i in range(3))
+
+
+def test_a_new_phrase_at_rest_draws_no_splat(renderer):
+    scene, seen = layered(6), between(6)
+    renderer.set_scene(scene)
+    renderer.ask(question(scene, 1))
+    renderer.draw(seen)
+    renderer.relevance()
+    passes = dict(renderer.passes)
+    assert passes["colour"] == 4 and passes["blend"] == 1
+    assert passes["weights"] == 8  # thirty atoms are two passes of each
+    renderer.ask(question(scene, 3, seed=7))
+    renderer.draw(seen)
+    renderer.relevance()
+    renderer.heat_texture(2)
+    renderer.label_texture()
+    renderer.atom_texture()
+    renderer.feature_texture()
+    kinds = ("colour", "weights", "blend", "pack")
+    assert [renderer.passes[kind] for kind in kinds[:3]] == [passes[kind] for kind in kinds[:3]]
+
+
+@pytest.mark.parametrize("num_views", [2, 6])
+def test_marks_hide_and_tint_in_every_layer(renderer, num_views):
+    """Also in layers that come into view after them."""
+    scene, seen = layered(num_views), between(num_views)
+    shown = np.random.default_rng(0).random(len(scene.gaussians)) < 0.6
+    none = np.zeros(len(shown), np.uint8)
+    renderer.set_scene(scene)
+    renderer.draw(replace(seen, viewmat=scene.viewmats[0].double()))
+    renderer.mark(shown, none)
+    renderer.draw(seen)
+    frame = renderer.frame(weight_maps=True)
+    expected = compose.render(doubled(scene.rows(torch.from_numpy(shown))), seen)
+    # Other Gaussians tell another median distance, by some percent: what layers count changes as much.
+    assert psnr(frame.rgb, expected.rgb) >= 45 and psnr(frame.alphas, expected.alphas) >= 45
+    renderer.mark(np.ones(len(shown), bool), none)
+    renderer.draw(seen)
+    plain, weights = renderer.frame(weight_maps=True), renderer.passes["weights"]
+    renderer.mark(np.ones(len(shown), bool), none + 1)
+    renderer.draw(seen)
+    blue = renderer.frame(weight_maps=True)
+    assert torch.equal(blue.alphas, plain.alphas) and torch.equal(maps_of(blue), maps_of(plain))
+    assert renderer.passes["weights"] == weights, "a tint draws no weight maps"
+    assert float((blue.rgb[..., 2] - blue.rgb[..., 0]).mean()) > 0.1
+
+
+def test_changes_reach_every_layer(gl):
+    scene, seen = layered(3), between(3)
+    chosen = torch.arange(len(scene.gaussians)) % 3 == 0
+    changes = (
+        Moved(Mask.of(chosen.numpy()), offset=(0.3, 0.1, 0.2)),
+        Recoloured.tinted(Mask.of(~chosen.numpy()), (1.0, 0.0, 0.0), 0.5, 0.5),
+    )
+    expected = compose.render(doubled(replace(scene, gaussians=changed(scene.gaussians, changes))), seen)
+    renderer = SplatRenderer(gl, "float32")
+    renderer.set_scene(scene)
+    renderer.draw(replace(seen, viewmat=scene.viewmats[0].double()))
+    renderer.change(changes)
+    renderer.draw(seen)
+    assert psnr(renderer.frame().rgb, expected.rgb) >= PSNR["float32"]
+    renderer.change(())
+    renderer.draw(seen)
+    assert psnr(renderer.frame().rgb, compose.render(doubled(scene), seen).rgb) >= PSNR["float32"]
+    renderer.release()
+
+
+def test_pictures_are_continuous_where_another_layer_comes_in(gl):
+    """Steps of a walk along six photos: where the nearest four change, by no more than elsewhere."""
+    scene = layered(6)
+    nearness = compose.Nearness.of(scene)
+    places = np.linspace(1.2, 3.8, 105)
+    seen = [camera(48, 40, 40.0, turned(0.04 * p, (-0.12 * p, 0.02, 0.03))) for p in places]
+    renderer = SplatRenderer(gl, "float32")
+    renderer.set_scene(scene)
+    pictures = []
+    for each in seen:
+        renderer.draw(each, weight_maps=False)
+        pictures.append(renderer.frame().rgb.double().numpy())
+    renderer.release()
+    steps = np.abs(np.diff(pictures, axis=0)).mean((1, 2, 3))
+    chosen = [frozenset(nearness.chosen(each).views) for each in seen]
+    changes = np.array([one != other for one, other in pairwise(chosen)])
+    assert 2 <= changes.sum() < len(changes) / 4
+    assert steps[changes].max() <= 1.5 * np.median(steps[~changes])
+
+
+@pytest.mark.parametrize("num_views", NUM_VIEWS)
+@pytest.mark.parametrize("fast", [True, False], ids=["fast", "a share"])
+def test_a_moving_picture_covers_what_the_two_nearest_cover(renderer, num_views, fast):
+    """The nearest layer over the next one, in one pass each: premultiplied, as in the reference."""
+    scene, seen = layered(num_views), between(num_views)
+    share = 1.0 if fast else 0.999
+    renderer.set_scene(scene)
+    renderer.draw(seen, fast=fast, share=share, weight_maps=False)
+    moving = renderer.frame()
+    views = compose.Nearness.of(scene).chosen(seen).views[:2]
+    assert renderer.passes["colour"] == len(views) and renderer.passes["blend"] == 0
+    thinned = doubled(thin_with_rows(scene, share)[0])
+    parts = [reference.render(thinned.layer(view), seen, weight_maps=False) for view in views]
+    rgb, alphas = torch.zeros(80, 96, 3, dtype=torch.float64), torch.zeros(80, 96, dtype=torch.float64)
+    for part in reversed(parts):
+        rgb = part.rgb + (1 - part.alphas[..., None]) * rgb
+        alphas = part.alphas + (1 - part.alphas) * alphas
+    assert psnr(moving.rgb, rgb) >= 50 and psnr(moving.alphas, alphas) >= 50
+    renderer.draw(seen, weight_maps=False)
+    if fast and num_views <= 2:  # there the resting picture has no other layers
+        assert (renderer.frame().alphas - moving.alphas).max() <= 1e-5  # float32 in both
+
+
+def test_numbers_of_a_moving_picture_are_exact_where_all_mean_the_same(gl):
+    scene, seen = layered(3), between(3)
+    ids = torch.full_like(scene.semantics.weight_ids, 2)
+    scene = replace(scene, semantics=replace(scene.semantics, weight_ids=ids))
+    compiled = question(scene, 2)
+    renderer = SplatRenderer(gl, "float32")
+    renderer.set_scene(scene)
+    renderer.ask(compiled)
+    renderer.draw(seen, fast=True)
+    renderer.carry()
+    fast = renderer.relevance()
+    assert renderer.passes["colour"] == 2 and renderer.passes["weights"] == 0
+    renderer.draw(seen)
+    exact = renderer.relevance()
+    both = (fast > 0).all(0) & (exact > 0).all(0)
+    assert both.float().mean() > 0.5
+    assert (fast - exact)[:, both].abs().max() <= 1e-5  # float32 and a sigmoid
+    renderer.release()
+
+
+def test_numbers_are_made_once_a_layer(renderer, monkeypatch):
+    from app.gl import question as asked
+
+    made = []
+    real = asked.splat_numbers
+    monkeypatch.setattr(asked, "splat_numbers", lambda *given: made.append(given) or real(*given))
+    scene = layered(2)
+    renderer.set_scene(scene)
+    renderer.ask(question(scene, 2))
+    for step in range(4):
+        renderer.draw(camera(96, 80, 80.0, turned(0.01 * step, (-0.02 * step, 0.0, 0.0))), fast=True)
+        renderer.relevance()
+    assert len(made) == 2
+
+
+def test_more_phrases_than_fit_are_asked_of_what_moves(gl):
+    """Weight maps of the nearest layer over the next's."""
+    scene, seen = layered(2), between(2)
+    compiled = question(scene, 40)
+    renderer = SplatRenderer(gl, "float32")
+    renderer.set_scene(scene)
+    renderer.ask(compiled)
+    renderer.draw(seen, fast=True)
+    views = compose.Nearness.of(scene).chosen(seen).views
+    first, second = (reference.render(doubled(scene).layer(view), seen) for view in views)
+    maps = maps_of(first) + (1 - first.alphas[..., None]) * maps_of(second)
+    error = (renderer.relevance() - full_relevance(scene, compiled, maps)).abs()
+    assert error.mean() <= RELEVANCE_ERROR["float32"]
+    renderer.release()
+
+
+def test_at_rest_after_moving_is_as_before(renderer):
+    scene, seen = layered(6), between(6)
+    renderer.set_scene(scene)
+    renderer.ask(question(scene, 2))
+    renderer.draw(seen)
+    before, relevance = renderer.frame(weight_maps=True), renderer.relevance()
+    renderer.draw(replace(seen, viewmat=scene.viewmats[0].double()), fast=True)
+    renderer.draw(seen, fast=True, share=0.5)
+    assert not torch.equal(renderer.frame().rgb, before.rgb)
+    renderer.draw(seen)
+    after = renderer.frame(weight_maps=True)
+    assert torch.equal(after.rgb, before.rgb) and torch.equal(maps_of(after), maps_of(before))
+    assert torch.equal(renderer.relevance(), relevance)
+
+
+def test_pictures_for_films_are_those_on_show(renderer):
+    scene, seen = layered(6), between(6)
+    renderer.set_scene(scene)
+    film = renderer.colours(seen).astype(int)
+    renderer.draw(seen)
+    shown = np.frombuffer(renderer.rgb_texture.read(), np.uint8).reshape(80, 96, 4)[..., :3].astype(int)
+    assert np.abs(film - shown).max() <= 1  # of two roundings
+    first = renderer.frame().rgb
+    renderer.colours(replace(seen, viewmat=scene.viewmats[0].double()))
+    renderer.draw(seen)
+    assert torch.equal(renderer.frame().rgb, first), "what a film drew between is not taken for this picture"
+    relevant = compose.render(doubled(scene), seen)
+    assert (maps_of(renderer.frame(weight_maps=True)) - maps_of(relevant)).abs().mean() <= 2e-3
+
+
+@pytest.mark.parametrize("num_views", NUM_VIEWS)
+def test_a_still_picture_agrees_with_the_reference(num_views):
+    scene, seen = layered(num_views), between(num_views)
+    still, expected = draw_still(scene, seen, threads=2), compose.render(doubled(scene), seen)
+    # As in processor/test_still.py: colours and weights are kept as float16.
+    assert psnr(still.frame.rgb, expected.rgb) >= 60 and still.maps is not None
+    assert (still.maps.weights.double() - maps_of(expected)).abs().mean() < 2e-4
+    solid = expected.alphas > 0.5
+    assert ((still.frame.depths - expected.depths).abs()[solid] / expected.depths[solid]).mean() <= 1e-4
+    asked = question(scene, 3)
+    answered = torch.from_numpy(still.maps.relevance(asked)).double()
+    assert (answered - full_relevance(scene, asked, maps_of(expected))).abs().mean() < 2e-3
+
+
+def test_a_still_picture_is_the_renderers_marked_and_carried(gl):
+    scene, seen = layered(3), between(3)
+    random, count = np.random.default_rng(0), len(scene.gaussians)
+    marks = random.random(count) < 0.7, random.integers(0, 3, count).astype(np.uint8)
+    renderer = SplatRenderer(gl)
+    renderer.set_scene(scene)
+    renderer.mark(*marks)
+    renderer.draw(seen)
+    own, span = renderer.frame(weight_maps=True), renderer.depth_range
+    renderer.release()
+    carried = scene.semantics.dense_weights()[:, :3]
+    still = draw_still(scene, seen, marks=marks, carried=carried)
+    assert psnr(still.frame.rgb, own.rgb) >= 50 and still.maps is not None
+    assert (still.maps.weights - maps_of(own)[..., :3]).abs().mean() < 2e-3
+    assert still.depth_range == pytest.approx(span, rel=0.05)  # OpenGL counts what lies just beside the image
+
+
+def test_a_still_picture_stops_between_layers():
+    asked = []
+
+    def stopping() -> bool:
+        asked.append(None)
+        return len(asked) > most
+
+    scene, seen = layered(3), between(3)
+    most = 10**9
+    draw_still(scene, seen, stopping=stopping)
+    most, before = len(asked) * 2 // 3, len(asked)
+    asked.clear()
+    with pytest.raises(Cancelled):
+        draw_still(scene, seen, stopping=stopping)
+    assert len(asked) == most + 1 < before
+
+
+def test_a_thinned_level_keeps_every_layer_closed(renderer):
+    """Each photo's place is covered by its own layer as before, though the layers lie in each other."""
+    scene = layered(3, count=1200)
+    levels = torch.arange(len(scene.gaussians)) % 4 == 3
+    for known in (scene, replace(scene, levels=levels.to(torch.uint8))):
+        share = 0.25 if known.levels is None else 0.8
+        thinned, rows = thin_with_rows(known, share)
+        assert thinned.view_ids is not None and torch.equal(thinned.view_ids, known.view_ids[rows])
+        assert len(rows) <= np.ceil(share * len(known.gaussians))
+        for view in range(3):
+            full, left = (reference.render(s.layer(view), s.camera(view)) for s in (known, thinned))
+            assert left.alphas.mean() >= 0.93 * full.alphas.mean()
+        renderer.set_scene(known)
+        renderer.give_level(known, share, thinned, rows)
+        renderer.draw(between(3), share=share, weight_maps=False)
+        assert renderer.frame().alphas.mean() > 0.5
+
+
+def test_layers_are_kept_for_a_while_and_drawn_again_alike(renderer):
+    scene = layered(12, count=60)
+    renderer.set_scene(scene)
+    renderer.draw(scene.camera(0))
+    first = renderer.frame(weight_maps=True)
+    for view in range(1, 12):
+        renderer.draw(scene.camera(view), weight_maps=False)
+    level = renderer._scene.whole
+    assert isinstance(level, LayeredLevel) and len(level._layers) == KEPT < 12 and 0 not in level._layers
+    renderer.draw(scene.camera(0))
+    again = renderer.frame(weight_maps=True)
+    assert torch.equal(again.rgb, first.rgb) and torch.equal(maps_of(again), maps_of(first))
+
+
+def test_a_photo_sees_its_own_layer(gl):
+    scene = layered(3)
+    renderer = SplatRenderer(gl, "float32")
+    renderer.set_scene(scene)
+    renderer.draw(between(3))
+    renderer.coverage_texture()
+    renderer.agreement_texture()
+    photos = renderer._scene.photo_depths(False)
+    assert photos is renderer._scene.photo_depths(True)
+    width, height, count = photos.texture.size
+    drawn = np.frombuffer(photos.texture.read(), np.float32).reshape(count, height, width)
+    renderer.release()
+    for view in range(3):
+        frame = reference.render(scene.layer(view), scene.camera(view), weight_maps=False)
+        sure = np.abs(frame.alphas.numpy() - 0.5) > 1e-3
+        np.testing.assert_allclose(
+            drawn[view][sure], np.where(frame.alphas >= 0.5, frame.depths, 0)[sure], atol=1e-4
+        )
+
+
+@pytest.mark.parametrize("what", ["no owner", "nothing", "not finite"])
+def test_layers_that_show_nothing(renderer, what):
+    scene = layered(2, count=50)
+    if what == "no owner":
+        scene = replace(scene, view_ids=torch.full_like(scene.view_ids, -1))
+    elif what == "nothing":
+        scene = scene.rows(torch.zeros(len(scene.gaussians), dtype=torch.bool))
+    else:
+        means = torch.where((scene.view_ids == 0)[:, None], torch.nan, scene.gaussians.means)
+        scene = replace(scene, gaussians=replace(scene.gaussians, means=means))
+    seen = between(2)
+    renderer.set_scene(scene)
+    renderer.ask(question(scene, 2))
+    renderer.draw(seen, fast=True)
+    assert torch.isfinite(renderer.relevance()).all()
+    renderer.draw(seen)
+    frame, expected = renderer.frame(weight_maps=True), compose.render(doubled(scene), seen)
+    assert psnr(frame.rgb, expected.rgb) >= 50 and torch.isfinite(renderer.relevance()).all()
+    assert psnr(draw_still(scene, seen).frame.rgb, expected.rgb) >= 50
