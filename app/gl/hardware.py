@@ -18,16 +18,18 @@ from .weights import MakeMaps, WeightMaps
 @dataclass(frozen=True)
 class Hardware:
     """shapes: what Gaussians are drawn as. maps: how weight maps come about. answers: who multiplies them
-    with phrases. defines: of all shaders."""
+    with phrases. blends: whether layers of a scene are blended in moving pictures too, and not only the
+    nearest one drawn over the next. defines: of all shaders."""
 
     shapes: MakeShapes
     maps: MakeMaps
     answers: MakeAnswers
+    blends: bool
     defines: Mapping[str, float] = field(default_factory=dict)
 
 
-CARD = Hardware(Quads, WeightMaps, ShaderAnswers)
-PROCESSOR = Hardware(Sprites, CellMaps, HostAnswers, {"SOFTWARE": 1})
+CARD = Hardware(Quads, WeightMaps, ShaderAnswers, blends=True)
+PROCESSOR = Hardware(Sprites, CellMaps, HostAnswers, False, {"SOFTWARE": 1})
 
 
 def hardware_of(ctx: moderngl.Context) -> Hardware:

@@ -5,10 +5,10 @@ from itertools import count
 import numpy as np
 
 from langflash_core.language.relevance import CompiledQuery
+from langflash_core.splat.compose import NEAREST
 
 from .answers import MakeAnswers
 from .fast import MAX_PHRASES, splat_numbers
-from .layered import MOVING
 from .level import Level
 
 _names = count(1)
@@ -33,13 +33,13 @@ class Question:
         return self.compiled.factor.shape[0] > 0 and self.num_phrases <= MAX_PHRASES
 
     def numbers(self, level: Level) -> np.ndarray:
-        """What each Gaussian of a level carries in the fast mode (fast.py), (N, 3 L); kept for the last two
-        levels: a moving picture is of two layers."""
+        """What each Gaussian of a level carries in the fast mode (fast.py), (N, 3 L); kept for the last
+        levels, as many as a picture has layers."""
         numbers = self._numbers.pop(level, None)
         if numbers is None:
             factor = self.compiled.factor.detach().cpu().double().numpy()
             numbers = splat_numbers(level.splats, self.compiled, level.norms(factor))
         self._numbers[level] = numbers
-        while len(self._numbers) > MOVING:
+        while len(self._numbers) > NEAREST:
             self._numbers.pop(next(iter(self._numbers)))
         return numbers

@@ -159,7 +159,7 @@ class SplatRenderer:
         """Draw the scene; nothing is drawn again for the same scene, camera and size.
 
         A layered scene is blended of the layers nearest to the camera (langflash_core/splat/compose.py);
-        `fast`, or a share of it, is the nearest layer over the next, which fills its holes.
+        on a processor `fast`, or a share of it, is the nearest layer over the next, which fills its holes.
 
         Args:
             weight_maps: draw them at once; else the first question that needs them does.
@@ -173,7 +173,7 @@ class SplatRenderer:
             ValueError: there is no scene, or the image has no pixels.
             GraphicsError: the image is larger than the driver's textures, or the context is gone.
         """
-        scene, level, view = self._prepared(camera, share, fast or share < 1)
+        scene, level, view = self._prepared(camera, share, self._moves(fast, share))
         drawn = Drawn(view.colour, camera, background, level.places_key, self._fill)
         picture = DrawnPicture(scene, view, drawn, level, fast, level.depth_range)
         if self._question is not None and fast and self._question.fits_fast:
@@ -465,6 +465,10 @@ class SplatRenderer:
         level = self._scene.level(share)
         level.prepare(camera, moving)
         return self._scene, level, view
+
+    def _moves(self, fast: bool, share: float) -> bool:
+        """Whether a picture is to be quick rather than blended."""
+        return (fast or share < 1) and not self._canvas.hardware.blends
 
     def _drawn(self) -> Picture:
         """The picture asked for last; drawn again where another renderer of this canvas drew since."""

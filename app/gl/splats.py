@@ -179,7 +179,7 @@ class SplatBuffers:
         Args:
             program: of quad.vert with the defines of `shapes`.
         """
-        key = ("draw", program.glo)
+        key = ("draw", program.glo, None if weights is None else weights.glo)
         if key not in self._vaos:
             footprint, each = ("in_place", "in_shape"), self.shapes.each
             content: list[tuple] = [(self.places, f"4f 4f 12x{each}", *footprint)]

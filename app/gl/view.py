@@ -74,13 +74,17 @@ class ViewTargets:
         self._blend.draw(level)
         self._painter.passes["colour"] += len(level.parts)
 
+    def _shares(self, level: Prepared) -> moderngl.Texture | None:
+        """What each part of a level that is blended counts in each pixel."""
+        if level.weights is None:
+            return None
+        self.draw_colour(level)
+        assert self._blend is not None
+        return self._blend.shares
+
     def weight_maps(self, level: Prepared) -> Maps:
         """Those of the level as it stands, drawn unless they are there."""
-        if self.maps.shows(level) or level.weights is None:
-            return self.maps.of(level)
-        self.draw_colour(level)  # tells what each part counts
-        assert self._blend is not None
-        return self.maps.of(level, self._blend.shares)
+        return self.maps.of(level, None if self.maps.shows(level) else self._shares(level))
 
     def colours(self, level: Prepared) -> np.ndarray:
         """(H, W, 3) uint8, the colour alone over black; what was drawn here before is gone."""
@@ -119,11 +123,17 @@ class ViewTargets:
 
     def fast(self, question: Question, level: Prepared) -> LayerTarget:
         """Relevance from numbers beside the colour: all three in one splat pass of each part, one over the
-        other, unless they are there."""
+        other, or in one more where parts are blended, unless they are there."""
         passes = self.fast_passes(question.num_phrases)
         shown = (level.places_key, question.key)
         if passes.shows != shown:
-            self._splat(level, passes.framebuffer, [question.numbers(part) for part in level.parts])
+            numbers = [question.numbers(part) for part in level.parts]
+            shares = self._shares(level)
+            if shares is None:
+                self._splat(level, passes.framebuffer, numbers)
+            else:
+                passes.blend(level, numbers, shares)
+                self._painter.passes["colour"] += len(numbers)
             self._shown, passes.shows = level.places_key, shown
             passes.run(question.compiled)
         return passes.relevance

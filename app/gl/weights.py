@@ -117,12 +117,9 @@ class WeightMaps:
         self, splats: SplatBuffers, target: moderngl.Framebuffer, atoms: np.ndarray, first: int, count: int
     ) -> None:
         """One pass, of `count` layers of the atoms from place `first` on, over what is there."""
-        expanded = splats.expand(atoms, first, count)
-        defines = {"LAYERS": count, **splats.shapes.defines}
-        program = self.painter.programs.get("quad.vert", "weights.frag", defines)
-        set_uniforms(program, image_size=tuple(float(n) for n in self.size))
-        with drawing(target, PREMULTIPLIED):
-            splats.draw(program, expanded, count, colour=False)
+        if not len(splats.order):
+            return
+        splat_weights(self.painter, splats, splats.expand(atoms, first, count), count, target)
         self.painter.passes["weights"] += 1
 
     def release(self) -> None:
@@ -130,6 +127,17 @@ class WeightMaps:
         self.layers.release()
         self._own.release()
         self._maps = None
+
+
+def splat_weights(
+    painter: Painter, splats: SplatBuffers, weights: moderngl.Buffer, count: int, into: moderngl.Framebuffer
+) -> None:
+    """Splat `count` layers of weights, of the Gaussians chosen in draw order, over what is there."""
+    defines = {"LAYERS": count, **splats.shapes.defines}
+    program = painter.programs.get("quad.vert", "weights.frag", defines)
+    set_uniforms(program, image_size=tuple(float(n) for n in into.size))
+    with drawing(into, PREMULTIPLIED):
+        splats.draw(program, weights, count, colour=False)
 
 
 MakeMaps = Callable[[Painter, tuple[int, int], str], WeightMaps]
