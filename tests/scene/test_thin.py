@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 import torch
 
+from langflash_core.records import Record
 from langflash_core.scene.thin import (
     coarse_level,
     coarse_share,
@@ -178,3 +179,28 @@ def test_the_coarse_level_alone():
 def test_what_is_too_small_to_be_thinned_stays(count):
     scene = cloud(3, 5).rows(torch.arange(count))
     assert coarse_level(scene) is scene
+
+
+@pytest.mark.parametrize("leveled", [False, True])
+def test_layers_are_thinned_each_for_itself(leveled):
+    """Two that lie in each other: neighbours of another layer stand in for nobody."""
+    made = cloud(400, 3)
+    both = torch.arange(400).repeat(2)
+    levels = (torch.arange(800) % 400 % 2).to(torch.uint8) if leveled else None
+    views = torch.arange(800) // 400
+    one = made.rows(both)
+    scene = replace(
+        one, viewmats=one.viewmats.repeat(2, 1, 1), Ks=one.Ks.repeat(2, 1, 1), view_ids=views, levels=levels,
+        record=Record(layered=True),
+    )  # fmt: skip
+    thinned, rows = thin_with_rows(scene, 0.75 if leveled else 0.5)
+    assert thinned.layered and thinned.view_ids is not None
+    first, second = (rows[rows < 400], rows[rows >= 400] - 400)
+    assert abs(len(first) - len(second)) <= 1 and len(first) > 0
+    # They are alike, so are the draws, but for where the first one's ends.
+    assert len(np.intersect1d(first, second)) >= 0.5 * len(first)
+    if levels is not None:  # detail is told from the coarse ones of its own layer
+        recoloured = scene.gaussians.sh.clone()
+        recoloured[400:, 0] += 3.0  # as far from those of the other layer, whatever they are
+        moved = thin_with_rows(replace(scene, gaussians=replace(scene.gaussians, sh=recoloured)), 0.75)[1]
+        assert np.array_equal(moved, rows)

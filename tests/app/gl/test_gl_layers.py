@@ -200,7 +200,8 @@ def test_marks_hide_and_tint_in_every_layer(renderer, num_views):
 
 
 def test_changes_reach_every_layer(gl):
-    scene, seen = layered(3), between(3)
+    """Also those that come into view after them."""
+    scene, seen = layered(6), between(6)
     chosen = torch.arange(len(scene.gaussians)) % 3 == 0
     changes = (
         Moved(Mask.of(chosen.numpy()), offset=(0.3, 0.1, 0.2)),
