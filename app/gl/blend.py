@@ -57,11 +57,12 @@ class Blend:
 def add_maps(
     painter: Painter,
     own: LayerTarget,
+    first: int,
     count: int,
     shares: moderngl.Texture,
     part: int,
     into: moderngl.Framebuffer,
 ) -> None:
-    """Add the first `count` textures of one part's maps, times what it counts, to as many of the level's."""
-    textures = {"maps": own.array, "shares": shares}
-    painter.fill(into, "blend_maps.frag", textures, {"part": part}, {"LAYERS": count}, blend=ADDED)
+    """Add `count` layers of one part's maps, from `first` on, times what it counts, to as many others."""
+    textures, uniforms = {"maps": own.array, "shares": shares}, {"part": part, "first_layer": first}
+    painter.fill(into, "blend_maps.frag", textures, uniforms, {"LAYERS": count}, blend=ADDED)

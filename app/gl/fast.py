@@ -78,7 +78,7 @@ class FastPasses:
             if len(part.splats.order):
                 carried = part.splats.in_order(numbers[place])
                 splat_weights(self._painter, part.splats, carried, self.num_layers, alone)
-            add_maps(self._painter, own, self.num_layers, shares, place, into)
+            add_maps(self._painter, own, 0, self.num_layers, shares, place, into)
 
     def run(self, compiled: CompiledQuery) -> None:
         """Make `relevance` (4 phrases a layer, float32) of what was splatted last."""

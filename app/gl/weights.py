@@ -111,7 +111,7 @@ class WeightMaps:
             alone = own.layers(0, count)
             alone.clear()
             self._draw(part.splats, alone, atoms, first, count)
-            add_maps(self.painter, own, count, shares, place, target)
+            add_maps(self.painter, own, 0, count, shares, place, target)
 
     def _draw(
         self, splats: SplatBuffers, target: moderngl.Framebuffer, atoms: np.ndarray, first: int, count: int

@@ -8,6 +8,7 @@ import numpy as np
 
 from langflash_core.graphics import set_uniforms
 
+from ..blend import add_maps
 from ..buffers import Growing
 from ..carried import bytes_of
 from ..layout import ATOMS_A_LAYER, ATOMS_A_PASS, LAYERS_A_PASS, num_layers
@@ -23,8 +24,8 @@ _SPLATS_AT_ONCE = 1 << 17  # of cells: 13 MB of weights
 
 
 class CellMaps(WeightMaps):
-    """As `WeightMaps`; whole where there are no sprites, or several parts, or splats and cells make too many
-    pairs."""
+    """As `WeightMaps`; whole where there are no sprites, one part lies over another, or splats and cells make
+    too many pairs."""
 
     def __init__(self, painter: Painter, size: tuple[int, int], dtype: str):
         super().__init__(painter, size, dtype)
@@ -32,37 +33,47 @@ class CellMaps(WeightMaps):
         self._stream = Stream(painter.ctx)
 
     def draw(self, level: Prepared, shares: moderngl.Texture | None) -> Maps:
-        splats = level.parts[0].splats
-        sprites = splats.shapes
-        if len(level.parts) > 1 or not isinstance(sprites, Sprites) or sprites.footprints is None:
+        found = [self._cells_of(part.splats) for part in level.parts]
+        cells = [each for each in found if each is not None]
+        if len(cells) < len(found) or (shares is None and len(cells) > 1):
             return super().draw(level, shares)
-        cells = cells_of(sprites.footprints.boxes(), partial(_atoms_of, splats), self.size)
-        if cells is None:
-            return super().draw(level, shares)
-        return Maps(*self._drawn_in(cells, splats, sprites), level.order_key)
+        reached = [each.atoms for each in cells if len(each.boxes)] or [cells[0].atoms]
+        atoms = together(np.concatenate(reached))
+        layers = self.layers.at_least(max(1, -(-len(atoms) // ATOMS_A_PASS) * LAYERS_A_PASS))
+        if shares is None:
+            self._draw_in(layers, cells[0], level.parts[0].splats, atoms)
+        else:
+            _clear(layers, atoms)
+            own = self._own.exactly(layers.num_layers)
+            for place, part in enumerate(level.parts):
+                self._draw_in(own, cells[place], part.splats, atoms)
+                for first in _passes(atoms):
+                    into = layers.layers(first, LAYERS_A_PASS)
+                    add_maps(self.painter, own, first, LAYERS_A_PASS, shares, place, into)
+        return Maps(layers, atoms, level.order_key)
 
-    def _drawn_in(
-        self, cells: Cells, splats: SplatBuffers, sprites: Sprites
-    ) -> tuple[LayerTarget, np.ndarray]:
+    def _cells_of(self, splats: SplatBuffers) -> Cells | None:
+        """The cells that splats reach; None where they are better drawn whole."""
+        sprites = splats.shapes
+        if not isinstance(sprites, Sprites) or sprites.footprints is None:
+            return None
+        return cells_of(sprites.footprints.boxes(), partial(_atoms_of, splats), self.size)
+
+    def _draw_in(self, layers: LayerTarget, cells: Cells, splats: SplatBuffers, atoms: np.ndarray) -> None:
         """Cells that need as many layers are drawn beside each other, into the first ones of an array for
         that, and go from there to their atoms' layers: a framebuffer for each cell leaves all processors but
         one without work."""
-        atoms = together(cells.atoms)
-        passes = -(-len(atoms) // ATOMS_A_PASS)
-        layers = self.layers.at_least(max(1, passes * LAYERS_A_PASS))
-        for first in range(0, num_layers(len(atoms)), LAYERS_A_PASS):
-            layers.layers(first, LAYERS_A_PASS).clear()
-        for batch in batches(cells.atoms, atoms, layers.num_layers):
-            self._draw_batch(splats, sprites, cells, batch, batch.slots(atoms, cells.atoms.shape[1]))
+        _clear(layers, atoms)
+        for batch in batches(cells.atoms, atoms, layers.num_layers) if len(cells.boxes) else ():
+            self._draw_batch(splats, cells, batch, batch.slots(atoms, cells.atoms.shape[1]))
             boxes = cells.boxes[batch.cells].tolist()
             for place, chosen in enumerate(batch.layers.T.tolist()):
                 self._cells.at_least(1).copy(place, layers, zip(boxes, chosen, strict=True))
-        self.painter.passes["weights"] += passes
-        return layers, atoms
+        self.painter.passes["weights"] += len(_passes(atoms))
 
-    def _draw_batch(
-        self, splats: SplatBuffers, sprites: Sprites, cells: Cells, batch: Batch, slots: np.ndarray
-    ) -> None:
+    def _draw_batch(self, splats: SplatBuffers, cells: Cells, batch: Batch, slots: np.ndarray) -> None:
+        sprites = splats.shapes
+        assert isinstance(sprites, Sprites)
         count = batch.layers.shape[1]
         program = self.painter.programs.get("quad.vert", "weights.frag", {"LAYERS": count, **sprites.defines})
         set_uniforms(program, image_size=tuple(float(n) for n in self.size))
@@ -138,6 +149,16 @@ class Stream:
         self._vaos.clear()
         self._weights.release()
         self._footprints.release()
+
+
+def _passes(atoms: np.ndarray) -> range:
+    """The first layer of each pass of so many atoms."""
+    return range(0, num_layers(len(atoms)), LAYERS_A_PASS)
+
+
+def _clear(layers: LayerTarget, atoms: np.ndarray) -> None:
+    for first in _passes(atoms):
+        layers.layers(first, LAYERS_A_PASS).clear()
 
 
 def _atoms_of(splats: SplatBuffers, places: np.ndarray, starts: np.ndarray) -> np.ndarray:

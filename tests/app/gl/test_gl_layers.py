@@ -8,11 +8,14 @@ import pytest
 import torch
 
 from app.gl import SplatRenderer
-from app.gl.hardware import CARD, hardware_of
+from app.gl.hardware import CARD, PROCESSOR, hardware_of
 from app.gl.layered import KEPT, LayeredLevel
+from app.gl.processor.cell_maps import CellMaps
 from app.gl.processor.still import draw_still
+from app.gl.weights import WeightMaps
 from langflash_core.errors import Cancelled
 from langflash_core.geometry.cameras import invert_rigid
+from langflash_core.graphics import draws_in_software
 from langflash_core.records import Record
 from langflash_core.scene.changed import changed
 from langflash_core.scene.changes import Moved, Recoloured
@@ -122,6 +125,24 @@ def test_a_picture_is_blended_as_the_reference_has_it(gl, precision, num_views):
     assert (maps_of(frame) - maps_of(expected)).abs().mean() <= WEIGHT_ERROR[precision]
     # Weights of a Gaussian are in sum 1, and stay so when blended; K errors add up.
     assert (maps_of(frame).sum(-1) - expected.alphas).abs().mean() <= 10 * WEIGHT_ERROR[precision]
+
+
+def test_maps_drawn_in_cells_are_those_drawn_whole(gl, precision):
+    """To the bit: in other cells every weight of an atom is 0. A layer beside the picture, too."""
+    if not draws_in_software(gl):
+        pytest.skip("a graphics card draws whole maps")
+    scene = layered(3)
+    shift = torch.tensor([50.0, 0.0, 0.0]) * (scene.view_ids == 2)[:, None]
+    beside = replace(scene, gaussians=replace(scene.gaussians, means=scene.gaussians.means + shift))
+    for each in (scene, beside.rows(scene.view_ids >= 0)):
+        drawn = []
+        for maps in (CellMaps, WeightMaps):
+            renderer = SplatRenderer(gl, precision, hardware=replace(PROCESSOR, maps=maps))
+            renderer.set_scene(each)
+            renderer.draw(between(3))
+            drawn.append(maps_of(renderer.frame(weight_maps=True)))
+            renderer.release()
+        assert torch.equal(*drawn) and drawn[0].amax((0, 1)).min() > 0
 
 
 @pytest.mark.parametrize("num_views", NUM_VIEWS)
