@@ -1,7 +1,8 @@
 """The splat renderer: draws a scene once per camera and answers any phrase from what it drew.
 
 Passes, back to front, premultiplied: colour + depth + transmittance, then weight maps, 24 atoms
-a pass, only the atoms in view. Queries, heat-maps and labels read those and touch no splat.
+a pass, only the atoms in view; of a layered scene so for each layer, and then blended (blend.py).
+Queries, heat-maps and labels read those and touch no splat.
 Against the float64 reference (tests/app/gl/test_gl_against_reference.py): about 60 dB and a mean
 relevance error of 1e-4 with float16 targets, 100 dB and 1e-7 with float32.
 
@@ -48,8 +49,8 @@ class SplatRenderer:
     Row 0 of every texture is the top of the image: show them with the usual (0, 0)-(1, 1)
     texture coordinates of a window library, or read them without flipping.
 
-    `passes` counts what was drawn: "colour", "weights" (24 atoms each) touch splats; "norm",
-    "negatives", "query", "show" do not.
+    `passes` counts what was drawn: "colour", "weights" (24 atoms each) touch splats, those of every layer on
+    its own; "blend", "norm", "negatives", "query", "show" do not.
     """
 
     def __init__(
