@@ -45,11 +45,15 @@ class Blend:
         self._painter.fill(self._target, "blend.frag", textures, {"weights": weights}, defines)
         self._painter.passes["blend"] += 1
 
-    def release(self) -> None:
-        """Give every texture back."""
+    def forget(self) -> None:
+        """Give the pictures of single layers back; what each counts stays."""
         for layer in self._layers:
             layer.release()
         self._layers.clear()
+
+    def release(self) -> None:
+        """Give every texture back."""
+        self.forget()
         self._target.release()
         self.shares.release()
 

@@ -151,9 +151,11 @@ class ViewTargets:
             answers.forget()
 
     def forget_maps(self) -> None:
-        """Give the weight maps back; whoever asks for them draws them anew."""
+        """Give the weight maps back, and pictures of single layers; whoever asks for them draws them anew."""
         self.maps.release()
         self.packed.forget()
+        if self._blend is not None:
+            self._blend.forget()
 
     def fast_passes(self, num_phrases: int) -> FastPasses:
         """What so many phrases are splatted into beside the colour; kept for the last number."""

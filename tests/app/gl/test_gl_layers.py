@@ -83,6 +83,12 @@ def between(num_views: int) -> Camera:
     return camera(96, 80, 80.0, turned(0.04 * middle, (-0.12 * middle, 0.03, 0.05)))
 
 
+def views_of(scene: Scene) -> torch.Tensor:
+    """Which photo made each Gaussian."""
+    assert scene.view_ids is not None
+    return scene.view_ids
+
+
 def doubled(scene: Scene) -> Scene:
     semantics = scene.semantics
     values, atoms = semantics.weight_values.double(), semantics.dictionary.double()
@@ -132,9 +138,9 @@ def test_maps_drawn_in_cells_are_those_drawn_whole(gl, precision):
     if not draws_in_software(gl):
         pytest.skip("a graphics card draws whole maps")
     scene = layered(3)
-    shift = torch.tensor([50.0, 0.0, 0.0]) * (scene.view_ids == 2)[:, None]
+    shift = torch.tensor([50.0, 0.0, 0.0]) * (views_of(scene) == 2)[:, None]
     beside = replace(scene, gaussians=replace(scene.gaussians, means=scene.gaussians.means + shift))
-    for each in (scene, beside.rows(scene.view_ids >= 0)):
+    for each in (scene, beside.rows(views_of(scene) >= 0)):
         drawn = []
         for maps in (CellMaps, WeightMaps):
             renderer = SplatRenderer(gl, precision, hardware=replace(PROCESSOR, maps=maps))
@@ -443,7 +449,7 @@ def test_a_thinned_level_keeps_every_layer_closed(renderer):
     for known in (scene, replace(scene, levels=levels.to(torch.uint8))):
         share = 0.25 if known.levels is None else 0.8
         thinned, rows = thin_with_rows(known, share)
-        assert thinned.view_ids is not None and torch.equal(thinned.view_ids, known.view_ids[rows])
+        assert thinned.view_ids is not None and torch.equal(thinned.view_ids, views_of(known)[rows])
         assert len(rows) <= np.ceil(share * len(known.gaussians))
         for view in range(3):
             full, left = (reference.render(s.layer(view), s.camera(view)) for s in (known, thinned))
@@ -468,6 +474,19 @@ def test_layers_are_kept_for_a_while_and_drawn_again_alike(renderer):
     assert torch.equal(again.rgb, first.rgb) and torch.equal(maps_of(again), maps_of(first))
 
 
+def test_pictures_of_single_layers_of_one_size_are_kept(renderer):
+    """What each counts stays: weight maps of the size before need no colours again."""
+    scene, seen = layered(3), between(3)
+    renderer.set_scene(scene)
+    renderer.draw(seen)
+    first, view = renderer.frame(weight_maps=True), renderer.canvas.view((96, 80))
+    renderer.draw(seen.resized(48, 40))
+    assert not view._blend._layers
+    renderer.draw(seen)
+    again = renderer.frame(weight_maps=True)
+    assert torch.equal(again.rgb, first.rgb) and torch.equal(maps_of(again), maps_of(first))
+
+
 def test_a_photo_sees_its_own_layer(gl):
     scene = layered(3)
     renderer = SplatRenderer(gl, "float32")
@@ -475,8 +494,10 @@ def test_a_photo_sees_its_own_layer(gl):
     renderer.draw(between(3))
     renderer.coverage_texture()
     renderer.agreement_texture()
-    photos = renderer._scene.photo_depths(False)
-    assert photos is renderer._scene.photo_depths(True)
+    live = renderer._scene
+    assert live is not None
+    photos = live.photo_depths(False)
+    assert photos is live.photo_depths(True)
     width, height, count = photos.texture.size
     drawn = np.frombuffer(photos.texture.read(), np.float32).reshape(count, height, width)
     renderer.release()
@@ -492,15 +513,15 @@ def test_a_photo_sees_its_own_layer(gl):
 def test_layers_that_show_nothing(renderer, what):
     scene = layered(2, count=50)
     if what == "no owner":
-        scene = replace(scene, view_ids=torch.full_like(scene.view_ids, -1))
+        scene = replace(scene, view_ids=torch.full_like(views_of(scene), -1))
     elif what == "one layer out of view":
-        means = scene.gaussians.means - 50 * (scene.view_ids == 1)[:, None]
-        owned = scene.view_ids >= 0
+        means = scene.gaussians.means - 50 * (views_of(scene) == 1)[:, None]
+        owned = views_of(scene) >= 0
         scene = replace(scene, gaussians=replace(scene.gaussians, means=means)).rows(owned)
     elif what == "nothing":
         scene = scene.rows(torch.zeros(len(scene.gaussians), dtype=torch.bool))
     else:
-        means = torch.where((scene.view_ids == 0)[:, None], torch.nan, scene.gaussians.means)
+        means = torch.where((views_of(scene) == 0)[:, None], torch.nan, scene.gaussians.means)
         scene = replace(scene, gaussians=replace(scene.gaussians, means=means))
     seen = between(2)
     renderer.set_scene(scene)

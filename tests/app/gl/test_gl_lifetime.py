@@ -3,6 +3,7 @@
 import ctypes
 import mmap
 import random
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -12,11 +13,13 @@ from app.cli.renderers import open_renderer
 from app.gl import SplatRenderer, offscreen_context
 from app.gl.canvas import Canvas
 from app.gl.carried import atom_bits
+from app.gl.hardware import hardware_of
 from app.gl.ordering import stable_order
 from app.gl.targets import gl_function
 from langflash_core.errors import GraphicsError
 from langflash_core.types import Scene
 from tests.app.gl.questions import question
+from tests.app.gl.test_gl_layers import layered
 from tests.splat.scenes import camera, cloud, maps_of
 
 KINDS = ("Texture", "Buffer", "Framebuffer", "Program", "VertexArray", "Shader")
@@ -223,3 +226,26 @@ def test_atom_bits():
     bits = atom_bits(ids, values, 130)
     carried = [[k for k in range(192) if int(row[k // 64]) >> (k % 64) & 1] for row in bits]
     assert carried == [[0, 63], [5, 129], []]
+
+
+@pytest.mark.parametrize("blends", [True, False])
+def test_layers_leave_nothing(gl, use_another_program, blends):
+    """A walk past more than are kept, in two sizes, moving and at rest, with answers."""
+    use_another_program()
+    before = living(gl)
+    renderer = SplatRenderer(gl, hardware=replace(hardware_of(gl), blends=blends))
+    scene = layered(12, count=40)
+    renderer.set_scene(scene)
+    for view in range(12):
+        seen = scene.camera(view).resized(32 + 8 * (view % 2), 24)
+        renderer.ask(question(scene, 1 + view % 3))
+        renderer.draw(seen, fast=True, share=(1.0, 0.5)[view % 2])
+        renderer.relevance()
+        renderer.draw(seen)
+        renderer.relevance()
+        renderer.coverage_texture()
+    assert living(gl) != before
+    renderer.release()
+    use_another_program()
+    assert all(count <= before[kind] for kind, count in living(gl).items()), (living(gl), before)
+    assert gl.error == "GL_NO_ERROR"

@@ -21,7 +21,7 @@ def drawn(gl, scene, view, hardware: Hardware | None = None):
     frame = renderer.frame(weight_maps=True)
     film = renderer.colours(view).copy()
     assert renderer._scene is not None and frame.weight_maps is not None
-    shapes = renderer._scene.whole.splats.shapes
+    shapes = renderer._scene.whole.parts[0].splats.shapes
     renderer.release()
     maps = frame.weight_maps
     return (frame.rgb, frame.alphas, frame.depths, maps), film, isinstance(shapes, Sprites) and shapes.small
