@@ -1,7 +1,7 @@
 #version 330 core
 // Purpose: one picture of those of LAYERS layers of a scene: colour, depth, and what each layer counts in the pixel.
 // Source: langflash_core/splat/compose.py: S_i = A_i sum_j w_j A_j exp(-(ln(z_i / z_j) / DEPTH)^2) supports layer i, and
-//         b_i ~ w_i A_i (S_i / max S)^2, in sum 1. DEPTH and ALPHA_MIN are set by the program.
+//         b_i ~ w_i A_i (S_i / max S)^4, in sum 1. DEPTH and ALPHA_MIN are set by the program.
 // Frames: texel = pixel.
 
 uniform sampler2D colour_0, colour_1, colour_2, colour_3;  // premultiplied
@@ -51,6 +51,7 @@ void main() {
     for (int i = 0; i < 4; ++i) shares[i] = 0.0;
     for (int i = 0; i < LAYERS; ++i) {
         float ratio = support[i] / best;
+        ratio *= ratio;
         shares[i] = counts[i] * ratio * ratio;
         sum += shares[i];
     }

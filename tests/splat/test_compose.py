@@ -88,8 +88,9 @@ def test_half_way_between_two_photos_agreeing_layers_are_blended_alike():
 def test_the_best_supported_depth_shows_and_no_second_one():
     frames = [frame(0.2, 1, 2.0), frame(0.2, 1, 2.02), frame(0.9, 1, 1.0)]
     blend = compose.blended(frames, np.full(3, 1 / 3))
-    # support of the third is 1 beside 2: a quarter of the weight of either other one
-    assert torch.allclose(blend.rgb, torch.full_like(blend.rgb, (2 * 0.2 + 0.25 * 0.9) / 2.25), atol=0.01)
+    # support of the third is 1 beside 2: (1 / 2)^4 of the weight of either other one
+    expected = (2 * 0.2 + 0.9 / 16) / (2 + 1 / 16)
+    assert torch.allclose(blend.rgb, torch.full_like(blend.rgb, expected), atol=0.005)
 
 
 def test_a_hole_is_filled_by_the_next_layer():
