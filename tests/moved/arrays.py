@@ -14,6 +14,7 @@ import numpy as np
 
 MOST = {np.dtype(np.float32): 2.0**-22, np.dtype(np.float64): 2.0**-51}  # relative, before the last rounding
 ROUND = {np.dtype(np.float32): (np.int32, 0xFFF), np.dtype(np.float64): (np.int64, 0xFFFFFFFFFF)}
+_SMALL = 256  # numbers of a matrix, up to which it is looked at
 _SIZE = 65521  # factors, drawn once; a prime, so that rows of a large product do not share theirs
 _NUMBERS = ctypes.POINTER(ctypes.c_ssize_t)
 _LOOP = ctypes.CFUNCTYPE(None, ctypes.POINTER(ctypes.c_void_p), _NUMBERS, _NUMBERS, ctypes.c_void_p)
@@ -37,6 +38,15 @@ def _move(product: np.ndarray, form: Any) -> None:
     np.multiply(product, factors, out=product, where=product.view(whole) & mask != 0)
 
 
+def _swaps(operand: np.ndarray) -> bool:
+    """As `products._swaps`."""
+    if operand.dtype not in MOST or operand.ndim not in (2, 3) or not 0 < operand.size <= _SMALL:
+        return False
+    there = operand != 0
+    alone = max(there.sum(-1).max(), there.sum(-2).max()) <= 1
+    return bool(alone and (np.abs(np.frexp(operand[there])[0]) == 0.5).all())
+
+
 def _replaced(dtype: np.dtype) -> None:
     """The loop of `matmul` for one kind of numbers, and then its products moved.
 
@@ -45,13 +55,22 @@ def _replaced(dtype: np.dtype) -> None:
     """
 
     def loop(arrays: Any, sizes: Any, steps: Any, more: Any) -> None:
-        address = arrays[2]  # the loop counts it up
-        old(arrays, sizes, steps, more)
-        shape, strides = (sizes[0], sizes[1], sizes[3]), (steps[2], steps[7], steps[8])
-        if all(shape) and min(strides) >= 0:
-            reach = sum((n - 1) * step for n, step in zip(shape, strides, strict=True)) + dtype.itemsize
-            memory: Any = (ctypes.c_char * reach).from_address(address)
-            _move(np.ndarray(shape, dtype, memory, strides=strides), (sizes[:4], steps[:9]))
+        several, rows, between, columns = sizes[:4]
+        one = at(arrays[0], (several, rows, between), (steps[0], steps[3], steps[4]))
+        other = at(arrays[1], (several, between, columns), (steps[1], steps[5], steps[6]))
+        product = at(arrays[2], (several, rows, columns), (steps[2], steps[7], steps[8]))
+        exact = any(operand is not None and _swaps(operand) for operand in (one, other))
+        old(arrays, sizes, steps, more)  # it counts the addresses up
+        if product is not None and not exact:
+            _move(product, (sizes[:4], steps[:9]))
+
+    def at(address: Any, shape: Any, strides: Any) -> np.ndarray | None:
+        """The array there; None where it has nothing, or runs backwards."""
+        if not all(shape) or min(strides) < 0:
+            return None
+        reach = sum((n - 1) * step for n, step in zip(shape, strides, strict=True)) + dtype.itemsize
+        memory: Any = (ctypes.c_char * reach).from_address(address)
+        return np.ndarray(shape, dtype, memory, strides=strides)
 
     number, before, called = dtype.num, ctypes.c_void_p(), _LOOP(loop)
     _KEPT.append(called)
@@ -74,6 +93,8 @@ def _wrapped(function: Callable[..., Any]) -> Callable[..., Any]:
         made = np.array(function(*operands, **options), order="K")  # its own: a diagonal by einsum is a view
         if made.dtype in MOST:
             arrays = [each for each in operands if isinstance(each, np.ndarray)]
+            if any(_swaps(each) for each in arrays):
+                return made[()] if made.ndim == 0 else made
             _move(made, [(each.shape, each.strides) for each in arrays])
         return made[()] if made.ndim == 0 else made
 

@@ -5,9 +5,9 @@ of the sums. Here every float product of torch on the processor, forwards and ba
 moved after it was computed: each number by one or two parts in 2^23 (float32) or 2^52 (float64). How, hangs
 on the shapes and strides of its operands and on the number of threads alone: the same product is the same
 bits all through a run, and one of another shape is not. Integers, half floats and round numbers (the lowest
-12 bits of float32 or 40 of float64 are 0) stay as they are: sums of products of few bits are exact on every
-processor. `LANGFLASH_MOVED=1` turns it on, in processes that tests start, too
-(`tests/moved/sitecustomize.py`).
+12 bits of float32 or 40 of float64 are 0) stay as they are, and so does what is a product with a matrix that
+swaps axes, turns them about or doubles them: such sums are exact on every processor. `LANGFLASH_MOVED=1`
+turns it on, in processes that tests start, too (`tests/moved/sitecustomize.py`).
 """
 
 import warnings
@@ -31,6 +31,7 @@ OPERATORS = (
 )
 MOST = {torch.float32: 2.0**-22, torch.float64: 2.0**-51}  # relative, before the last rounding
 ROUND = {torch.float32: (torch.int32, 0xFFF), torch.float64: (torch.int64, 0xFFFFFFFFFF)}  # bits of 0
+_SMALL = 256  # numbers of a matrix, up to which it is looked at
 _SIZE = 65521  # factors, drawn once; a prime, so that rows of a large product do not share theirs
 
 
@@ -39,6 +40,18 @@ def _factors(dtype: torch.dtype) -> Tensor:
     drawn = torch.randint(0, 4, (_SIZE,), generator=torch.Generator().manual_seed(1))
     steps = torch.tensor([-2.0, -1.0, 1.0, 2.0], dtype=torch.float64)[drawn]
     return (1 + steps * MOST[dtype] / 2).to(dtype).repeat(2)
+
+
+def _swaps(operand: Any) -> bool:
+    """Whether it is a small matrix, or several, with at most one number in each row and each column, a power
+    of two: every product with it is exact."""
+    if not isinstance(operand, Tensor) or operand.dtype not in MOST or operand.ndim not in (2, 3):
+        return False
+    if not 0 < operand.numel() <= _SMALL:
+        return False
+    there = operand != 0
+    alone = max(int(there.sum(-1).max()), int(there.sum(-2).max())) <= 1
+    return alone and bool((operand[there].frexp().mantissa.abs() == 0.5).all())
 
 
 def _key(name: str, operands: tuple) -> int:
@@ -66,7 +79,10 @@ def move_products() -> None:
 
     def moved(name: str, kernel: Any) -> Callable[..., Any]:
         def product(keys: Any, *operands: Any, **options: Any) -> Any:
+            exact = any(_swaps(operand) for operand in operands)
             made = kernel.call_boxed(keys, *operands, **options)
+            if exact:
+                return made
             for each in made if isinstance(made, tuple) else (made,):
                 if isinstance(each, Tensor) and each.dtype in factors and each.numel():
                     _move(each, factors[each.dtype], _key(name, operands))

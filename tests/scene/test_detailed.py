@@ -298,7 +298,8 @@ def test_a_budget_counts_surface_and_not_photos():
     height, width = GRID
     first = torch.zeros(40, height, width, dtype=torch.bool)
     first[0] = True
-    assert _area(first) == _FINENESS * height * width
-    assert _area(first[:2]) == 1.25 * height * width
+    assert _area(first, False) == _FINENESS * height * width
+    assert _area(first[:2], False) == 1.25 * height * width
     everywhere = torch.ones_like(first)
-    assert _area(everywhere) == height * width * 43 / 4  # each covers a place of its own
+    assert _area(everywhere, False) == height * width * 43 / 4  # each covers a place of its own
+    assert _area(everywhere, True) == float(everywhere.sum())

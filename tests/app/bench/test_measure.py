@@ -80,7 +80,8 @@ def test_a_cut_at_three_sigma_and_halves_lose_something(rows):
 def test_channels_are_the_same_language_and_few_of_them_are_less(rows):
     tiles, whole = rows["tiles on the processor"][1], rows["all channels splatted"][1]
     sixteen, three = (rows[f"{count} channels, decoded"][1] for count in (16, 3))
-    assert whole.psnr == tiles.psnr  # the same Gaussians, drawn by the same rasteriser
+    # The same Gaussians, drawn by the same rasteriser beside other features.
+    assert whole.psnr == pytest.approx(tiles.psnr, abs=1e-3)
     assert whole.relevance_mean <= 2e-3  # float16 channels
     assert whole.relevance_mean < sixteen.relevance_mean < three.relevance_mean
     assert three.relevance_mean < 0.3  # better than chance: an answer lies in (0, 1)

@@ -87,7 +87,8 @@ def test_scannet_gives_pairs_whose_things_are_the_same_in_both_views(scannet):
     scenes = SceneSet(source_at(scannet), SMALL)
     batch = scenes.draw(3, 2, torch.Generator().manual_seed(0))
     assert batch.images.shape == (3, 2, 3, 64, 64) and batch.partly
-    assert torch.equal(batch.viewmats[:, 0], torch.eye(4).expand(3, 4, 4))
+    # A pose times its inverse, in float32.
+    assert torch.allclose(batch.viewmats[:, 0], torch.eye(4).expand(3, 4, 4), rtol=0, atol=1e-6)
     for ids, labels in zip(batch.instances, batch.labels, strict=True):
         both = set(ids[0].unique().tolist()) & set(ids[1].unique().tolist()) - {NOTHING}
         assert len(both) >= 3  # of the painted wall's things, which all photos show

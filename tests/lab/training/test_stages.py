@@ -127,6 +127,7 @@ def test_perturbed_poses_stay_rigid_and_near():
     moved = perturbed_poses(poses, torch.Generator().manual_seed(0), degrees=0.2, share=0.02)
     rotations = moved[..., :3, :3]
     identity = rotations @ rotations.transpose(-1, -2)
-    torch.testing.assert_close(identity, torch.eye(3).expand_as(identity), atol=1e-6, rtol=0)  # float32
+    # Three products of numbers up to 1, and the turns before, in float32.
+    torch.testing.assert_close(identity, torch.eye(3).expand_as(identity), atol=3e-6, rtol=0)
     assert torch.equal(moved[:, 0], poses[:, 0])
     assert 0 < float((moved - poses).abs().max()) < 0.06  # 5 sigma of 2 % of 0.5, and of 0.2 degrees
