@@ -21,6 +21,7 @@ def test_of_two_layers_that_show_one_wall_one_keeps_it():
 
 def test_what_no_photo_made_stays():
     scene = layered([(2, 0.2, 0), (2, 0.8, 1)], [0, 0.2])
+    assert scene.view_ids is not None
     ids = scene.view_ids.clone()
     ids[:7] = -1
     assert bool(fused_rows(replace(scene, view_ids=ids))[:7].all())

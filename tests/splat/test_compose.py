@@ -69,6 +69,7 @@ def test_a_scene_without_layers_is_drawn_by_the_reference_alone():
     scene = layered([(2, 0.3, 0), (2, 0.7, 1)], [0, 0.5]).with_record(layered=False)
     camera = camera_at(scene, 0.1)
     ours, theirs = compose.render(scene, camera), reference.render(scene, camera)
+    assert ours.weight_maps is not None and theirs.weight_maps is not None
     assert torch.equal(ours.rgb, theirs.rgb) and torch.equal(ours.weight_maps, theirs.weight_maps)
 
 
@@ -119,6 +120,7 @@ def test_weight_maps_are_blended_with_the_same_numbers():
     scene = layered([(2, 0.2, 0), (2, 0.8, 1)], [0, 1.0])
     got = compose.render(scene, camera_at(scene, 0.3))
     # each layer is of one atom and one grey, so W tells the grey: linear in the blend
+    assert got.weight_maps is not None
     expected = 0.2 * got.weight_maps[..., 0] + 0.8 * got.weight_maps[..., 1]
     assert torch.allclose(got.rgb[..., 0], expected, atol=1e-5)  # float32
     assert torch.allclose(got.weight_maps.sum(-1), got.alphas, atol=1e-5)
@@ -154,6 +156,7 @@ def test_one_photo_is_one_layer_and_turning_round_still_shows_it():
 
 def test_what_no_photo_made_is_in_every_layer():
     scene = layered([(2, 0.2, 0), (2, 0.8, 1)], [0, 1.0])
+    assert scene.view_ids is not None
     ids = scene.view_ids.clone()
     ids[:10] = -1
     both = replace(scene, view_ids=ids)
