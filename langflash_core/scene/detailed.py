@@ -219,9 +219,7 @@ def _kept(
     middle = prediction.depths[usable].median() if bool(usable.any()) else torch.tensor(1.0)
     depths = torch.where(usable, prediction.depths, middle)
     Ks = views.Ks.to(depths)
-    poses = invert_rigid(prediction.viewmats)
-    pos_c = unproject(depths, Ks).flatten(1, 2)
-    points = pos_c @ poses[:, :3, :3].transpose(1, 2) + poses[:, None, :3, 3]
+    points = _points(depths, prediction.viewmats, Ks)
     nowhere = torch.where(usable.flatten(1)[..., None], points, torch.nan)
     unit = mean_distance(nowhere[0], prediction.viewmats[0])
     if layered:
@@ -245,10 +243,14 @@ def covering(
     Args:
         depths: (V, H, W) > 0. usable: where they show something. trusts: how sure they are, in [0, 1].
     """
+    return _covering(depths, viewmats, Ks, usable, trusts, _points(depths, viewmats, Ks), None)[0]
+
+
+def _points(depths: Tensor, viewmats: Tensor, Ks: Tensor) -> Tensor:
+    """(V, H W, 3) in the world."""
     poses = invert_rigid(viewmats)
     pos_c = unproject(depths, Ks).flatten(1, 2)
-    points = pos_c @ poses[:, :3, :3].transpose(1, 2) + poses[:, None, :3, 3]
-    return _covering(depths, viewmats, Ks, usable, trusts, points, None)[0]
+    return pos_c @ poses[:, :3, :3].transpose(1, 2) + poses[:, None, :3, 3]
 
 
 def _covering(
