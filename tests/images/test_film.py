@@ -7,7 +7,6 @@ import cv2
 import numpy as np
 import pytest
 
-from langflash_core.apart import process
 from langflash_core.errors import Cancelled, FilmError
 from langflash_core.images.film import LOOKS, opened
 from tests import films
@@ -104,16 +103,6 @@ def test_what_is_no_film_is_a_sentence(film: Path, tmp_path: Path, capfd) -> Non
 def fields(film: Path) -> Path:
     """Of a walk of 50 pictures a second."""
     return films.write(film.with_name("fields.mp4"), films.walk(100, 3.0), 50)
-
-
-@pytest.fixture
-def alone(monkeypatch, tmp_path: Path):
-    """The decoder of OpenCV, without the program of imageio-ffmpeg."""
-    (tmp_path / "imageio_ffmpeg.py").write_text("raise ImportError")
-    monkeypatch.syspath_prepend(str(tmp_path))
-    process.end_idle()
-    yield
-    process.end_idle()
 
 
 @pytest.mark.parametrize("codec, suffix", [

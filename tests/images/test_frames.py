@@ -7,7 +7,6 @@ import cv2
 import numpy as np
 import pytest
 
-from langflash_core.apart import process
 from langflash_core.errors import Cancelled, FilmError
 from langflash_core.images import frames
 from langflash_core.images.film import Reader
@@ -159,16 +158,6 @@ def test_what_shows_nothing_is_a_sentence(tmp_path: Path, home: Path) -> None:
     with pytest.raises(FilmError, match="nothing from 9 s on"):
         chosen(tmp_path / "still.mp4", start=9.0)
     assert len(list((home / "films").iterdir())) == 1, "nothing of those is kept but the still's frame"
-
-
-@pytest.fixture
-def alone(monkeypatch, tmp_path: Path):
-    """The decoder of OpenCV, without the program of imageio-ffmpeg."""
-    (tmp_path / "imageio_ffmpeg.py").write_text("raise ImportError")
-    monkeypatch.syspath_prepend(str(tmp_path))
-    process.end_idle()
-    yield
-    process.end_idle()
 
 
 def test_what_the_decoder_does_is_not_blamed_on_who_filmed(tmp_path: Path, alone, home: Path) -> None:
