@@ -9,7 +9,6 @@ from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import overload
 
-import numpy as np
 import torch
 from jaxtyping import Bool
 from torch import Tensor
@@ -17,8 +16,7 @@ from torch.nn import functional as F
 
 from langflash_core.at_once import at_once
 from langflash_core.detail import Detail
-from langflash_core.geometry.harmonics import colour_to_sh, sh_to_colour, slopes_to_sh
-from langflash_core.images.motion import edge_rise
+from langflash_core.geometry.harmonics import colour_to_sh, sh_to_colour
 from langflash_core.images.views import source_picture, source_size
 from langflash_core.running import Progress
 from langflash_core.scene.assemble import placed_views
@@ -31,19 +29,8 @@ from langflash_core.splat.colours import ROUNDS, solved_colours
 from langflash_core.types import Cost, Prediction, Scene, Views
 
 _HELD = 8  # photos that stay decoded
-_JUDGES = 5
-"""Photos from which on Gaussians that hinder are left out: eight bring .2 to .7 dB, four .2 for a fifth of
-the time."""
-_SLOPES = 3
-"""Photos from which on colours change with the direction. Of two they bring 2 dB at their own places, nothing
-between, and -.1, -.3 and -.6 dB 20, 30 and 45 degrees aside."""
 _LEFT_OUT = "1 photo shows something that the others do not ({}); it is left out"
 _LEFT_OUT_OF_SOME = "{} photos show things that the others do not ({}); those things are left out"
-_SHARP = 1.1
-"""Times the width of the sharpest photo's edges, up to which a photo is as sharp: rendered photos of one room
-differ by 1.03, of 32 real ones half by 1.4 to 2."""
-_RINGING = 0.3
-"""Of what a photo varies by around a Gaussian, how far its colour may go beyond: blur needs some of it."""
 
 
 @dataclass(frozen=True)
@@ -65,15 +52,13 @@ def covered_scene(
     *,
     gaussians: int | None,
     preset: str,
-    layered: bool = False,
     progress: Progress = lambda stage, fraction: None,
 ) -> Covered:
     """The scene of a prediction whose depth maps are surfaces, before colours are solved for: all that needs
     the prediction, whose maps of many photos are much memory.
 
     Args:
-        gaussians: about so many; None: as `detail` has it. preset: recorded. layered: every photo keeps a
-            whole layer of its own (`splat.compose`).
+        gaussians: about so many; None: as `detail` has it. preset: recorded.
         progress: called before each step; what it raises ends the work there.
 
     Raises:
@@ -89,11 +74,7 @@ def covered_scene(
     grid = (views.images.shape[-2], views.images.shape[-1])
     photos, whole = _Photos(views, light, grid), _Photos(views, light.whole, grid)
     views = replace(views, images=light.corrected(views.images).clamp(0, 1))
-    layered = layered and views.num_views > 1
-    if layered:
-        left = torch.zeros_like(prediction.depths, dtype=torch.bool)
-    else:
-        left = strangers(views.images, prediction.depths, prediction.viewmats, views.Ks)
+    left = strangers(views.images, prediction.depths, prediction.viewmats, views.Ks)
     scene = assemble_detailed(
         prediction,
         views,
@@ -101,8 +82,6 @@ def covered_scene(
         detail,
         gaussians=gaussians,
         strangers=left if bool(left.any()) else None,
-        fineness=None if layered else photos.fineness,
-        layered=layered,
         preset=preset,
         progress=lambda done: progress("elements", 0.1 + 0.3 * done),
     )
@@ -115,8 +94,7 @@ def coloured_scene(covered: Covered, progress: Progress = lambda stage, fraction
     """The scene in the colours of all its photos, without what nobody sees; `progress` as `covered_scene`."""
     solving, left = time.perf_counter(), covered.left
     silent, light = _Silent(covered.photos, left), covered.light
-    coloured = _coloured_layers if covered.scene.layered else _coloured
-    scene = coloured(covered.scene, silent, light, lambda done: progress("colours", 0.4 + 0.5 * done))
+    scene = _coloured(covered.scene, silent, light, lambda done: progress("colours", 0.4 + 0.5 * done))
     timings = {**scene.record.cost.timings, "colours": time.perf_counter() - solving}
     shares = _shares(left)
     said = (*scene.record.warnings, *_told(shares, scene.record.photos))
@@ -159,19 +137,6 @@ class _Photos(Sequence[Tensor]):
         """(width, height) of one."""
         height, width = working_size(source_size(self._views, index), self._grid)
         return width, height
-
-    @property
-    def fineness(self) -> Tensor:
-        """(V,) pixels of each in a row of a cell of the grid, as many as its blur leaves."""
-        rises = [edge_rise(_grey(photo)) for photo in self]
-        sharp = _SHARP * min(filter(None, rises), default=0.0)
-        blurs = [max(1.0, rise / sharp) if rise else 1.0 for rise in rises]
-        return torch.tensor([self.size(v)[0] / self._grid[1] / blurs[v] for v in range(len(self))])
-
-
-def _grey(photo: Tensor) -> np.ndarray:
-    """(h, w) uint8 of (3, h, w) in [0, 1]."""
-    return (255 * photo.mean(0)).round().byte().cpu().numpy()
 
 
 class _Silent(Sequence[Tensor]):
@@ -217,43 +182,12 @@ def _told(left_out: dict[str, list[float]], names: tuple[str, ...]) -> list[str]
 
 
 def _coloured(scene: Scene, photos: _Silent, light: Light, progress: Callable[[float], None]) -> Scene:
-    """The scene in the colours that make its photos (3, h, w) again; its record says how near they come.
+    """Each photo's layer in the colours that make that photo (3, h, w) again; the record says how near they
+    come.
 
     What the brightest and the darkest photos show beyond black and white in the light of all is kept:
     at their places it is seen (`scene.exposure`).
     """
-    judged = len(photos) >= _JUDGES
-    low, high = (ends.float() for ends in light.span)
-    start = sh_to_colour(scene.gaussians.sh, scene.gaussians.means)
-    solved = solved_colours(
-        scene.gaussians,
-        (start - low) / (high - low),
-        [scene.camera(v, *photos.size(v)) for v in range(len(photos))],
-        photos,
-        owners=scene.view_ids,
-        ringing=_RINGING,
-        slopes=len(photos) >= _SLOPES,
-        leave_out=judged,
-        step=float((high - low).square().mean().sqrt()),
-        progress=progress,
-    )
-    sh = colour_to_sh(low + (high - low) * solved.colours)[:, None]
-    if solved.slopes is not None:
-        sh = torch.cat((sh, slopes_to_sh((high - low) * solved.slopes)), 1)
-    own = light.whole.gains.square().mean(1).sqrt().tolist()  # what a photo's own step is there
-    near = [
-        round(after + 20 * math.log10(gain), 2) for (_, after), gain in zip(solved.psnr, own, strict=True)
-    ]
-    bought = {**scene.record.detail, "rounds": ROUNDS, "photos_psnr_db": near}
-    scene = replace(scene, gaussians=replace(scene.gaussians, sh=sh)).with_record(detail=bought)
-    if not judged:
-        return scene
-    counts = {**scene.record.counts, "hindering": int(solved.hinders.sum())}
-    return scene.rows(~solved.hinders).with_record(counts=counts)
-
-
-def _coloured_layers(scene: Scene, photos: _Silent, light: Light, progress: Callable[[float], None]) -> Scene:
-    """As `_coloured`, each layer in the colours of its own photo alone."""
     assert scene.view_ids is not None
     low, high = (ends.float() for ends in light.span)
     start = sh_to_colour(scene.gaussians.sh, scene.gaussians.means)
@@ -265,11 +199,10 @@ def _coloured_layers(scene: Scene, photos: _Silent, light: Light, progress: Call
         found = solved_colours(
             scene.gaussians.map(lambda values: values[rows]),
             (start[rows] - low) / (high - low),
-            [scene.camera(view, *photos.size(view))],
-            [photos[view]],
-            ringing=_RINGING,
+            scene.camera(view, *photos.size(view)),
+            photos[view],
         )
-        return found.colours, found.psnr[0][1] + 20 * math.log10(own[view])
+        return found.colours, found.psnr[1] + 20 * math.log10(own[view])
 
     def turns() -> Iterator[int]:
         for view in range(len(photos)):

@@ -50,7 +50,6 @@ def reconstruct(
     grouping: str | None = None,
     detail: str | None = DEFAULT_DETAIL,
     gaussians: int | None = None,
-    layers: bool = False,
     refine_seconds: float | None = None,
     viewmats: Tensor | None = None,
     keep: Path | str | None = None,
@@ -80,8 +79,6 @@ def reconstruct(
         detail: how finely surfaces are covered: "low", "normal", "high"; None: one Gaussian a pixel,
             as the network makes them. Points of `full` are no surfaces: they stay as they are.
         gaussians: about so many, instead of as many as the detail has.
-        layers: every photo keeps a whole layer of its own, and a view is blended from those nearest to it
-            (`splat.compose`); preset mini, unless `detail` is None.
         refine_seconds: so long poses and Gaussians are fitted to the photos afterwards, and kept so
             if that brings a view closer that was held out; None: not at all.
         viewmats: poses (V, 4, 4) of the photos, world to camera, in any world and unit: they are not
@@ -117,7 +114,6 @@ def reconstruct(
         grouping=grouping,
         detail=detail,
         gaussians=gaussians,
-        layers=layers,
         refine_seconds=refine_seconds,
         viewmats=viewmats,
         keep=None if keep is None else Path(keep),

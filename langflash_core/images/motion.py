@@ -51,12 +51,6 @@ def look_at(picture: UInt8[np.ndarray, "H W 3"]) -> Look:
     return Look(_shrunk(grey, SIDE), sharpness, _farther(smooth), float(np.percentile(grey, 90)) / 255)
 
 
-def edge_rise(grey: Grey) -> float:
-    """Pixels over which even the sharpest edges of a picture rise, along the direction in which they rise
-    farther; 0 where there are too few to tell."""
-    return _farther(_smoothed(grey))
-
-
 def _smoothed(grey: Grey) -> Grey:
     """Grain and coding are no detail."""
     return cv2.GaussianBlur(grey, (3, 3), 0).astype(np.uint8, copy=False)

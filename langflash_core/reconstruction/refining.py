@@ -6,6 +6,7 @@ from jaxtyping import Float
 from torch import Tensor
 
 from langflash_core.errors import InputError
+from langflash_core.fused import fused
 from langflash_core.running import Progress
 from langflash_core.splat.refine import Budget, refine
 from langflash_core.types import Scene
@@ -14,9 +15,10 @@ from langflash_core.types import Scene
 def refined(
     scene: Scene, images: Float[Tensor, "V 3 H W"], seconds: float, device: str, progress: Progress
 ) -> Scene:
-    """The scene fitted to its photos, or as it was with a warning that says why; on the CPU again."""
+    """One surface of the scene fitted to its photos, or the scene as it was with a warning that says why; on
+    the CPU again."""
     try:
-        result = refine(_moved(scene, device), images.to(device), Budget(seconds), progress)
+        result = refine(_moved(fused(scene), device), images.to(device), Budget(seconds), progress)
     except InputError as reason:
         return scene.with_record(warnings=(*scene.record.warnings, f"not refined: {reason}"))
     fitted = result.recorded().scene

@@ -32,9 +32,7 @@ from langflash_core.types import Cost, FoundLens, Prediction, Scene, Views
 # Where each begins in the whole, from its measured share of the time on two CPU cores.
 STAGES = {"photos": 0.0, "weights": 0.08, "network": 0.16, "assemble": 0.66, "refine": 0.97, "level": 0.98}
 _PATIENCE = 0.2  # seconds, until it is told again how far something is
-_AS_IT_IS = (
-    "the preset '{}' makes one Gaussian a pixel; the detail or layers that were asked for are left out"
-)
+_AS_IT_IS = "the preset '{}' makes one Gaussian a pixel; the detail that was asked for is left out"
 
 
 def scene_of(wishes: Wishes, run: Run, networks: Networks, ahead: Ahead | None) -> Scene:
@@ -129,7 +127,7 @@ def _assembled(
     lenses = prediction.lenses
     with run.stage("assemble"), torch.no_grad():
         if tools.finer is None:
-            if wishes.layers or wishes.gaussians is not None or wishes.detail not in (None, DEFAULT_DETAIL):
+            if wishes.gaussians is not None or wishes.detail not in (None, DEFAULT_DETAIL):
                 note = _AS_IT_IS.format(wishes.preset)
                 prediction = replace(prediction, warnings=(*prediction.warnings, note))
             return prune(assemble(prediction, views, preset=wishes.preset)), images, lenses
@@ -140,7 +138,6 @@ def _assembled(
             tools.finer,
             gaussians=wishes.gaussians,
             preset=wishes.preset,
-            layered=wishes.layers,
             progress=told,
         )
         del prediction  # five megabytes a photo that nobody asks for any more

@@ -31,7 +31,6 @@ class Wishes:
     grouping: str | None = None
     detail: str | None = DEFAULT_DETAIL
     gaussians: int | None = None
-    layers: bool = False
     refine_seconds: float | None = None
     viewmats: Float[Tensor, "V 4 4"] | None = None
     keep: Path | None = None
@@ -48,8 +47,6 @@ class Wishes:
         check_gaussians(self.gaussians)
         if self.refine_seconds is not None:
             _check_refinement(self.refine_seconds, len(self.photos))
-            if self.layers:
-                raise InputError("a refinement fits one surface to all photos; leave it away, or the layers")
         return replace(self, device=device)
 
 

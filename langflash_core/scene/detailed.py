@@ -1,8 +1,7 @@
-"""From a network's `Prediction` to a `Scene` as fine as its photos: elements where there is detail, once
-each.
+"""From a network's `Prediction` to a `Scene` as fine as its photos: elements where there is detail.
 
-Depth, poses and groups stay those of the network's grid. Every surface is covered by the photo that sees
-it finest (`ownership`), by elements of the size that the photo asks for (`blocks`, `elements`).
+Depth, poses and groups stay those of the network's grid. Every photo covers all that it shows, by
+elements of the size that it asks for (`blocks`, `elements`): a layer of its own, whatever the others see.
 """
 
 import time
@@ -31,7 +30,6 @@ from langflash_core.scene.assemble import (
 from langflash_core.scene.blocks import LEVELS, Tree, grown, leaves, threshold
 from langflash_core.scene.borders import refined_weights
 from langflash_core.scene.clearance import clearances
-from langflash_core.scene.consistency import outvoted, seen_through
 from langflash_core.scene.elements import (
     COARSE,
     Elements,
@@ -42,7 +40,6 @@ from langflash_core.scene.elements import (
     placed,
     under,
 )
-from langflash_core.scene.ownership import filled, owned
 from langflash_core.scene.upsampling import Upsampled, upsampled
 from langflash_core.types import Camera, Cost, Gaussians, Prediction, Record, Scene, Views
 
@@ -53,9 +50,6 @@ MOST_ENLARGED = 3
 """Times the grid, the size up to which a photo is looked at."""
 MOST_OF_LAYERS = 2_500_000
 """Gaussians of all layers together: 160 MB in a file."""
-_FINENESS = 1.25
-"""Many photos cover what they see more finely than one. Of 17 photos round a room 1.0 gave 412,000 Gaussians
-and 27.2 dB between the photos, 1.5 and no bound 535,000 and 27.4."""
 
 
 def working_size(photo: tuple[int, int], grid: tuple[int, int]) -> tuple[int, int]:
@@ -81,8 +75,6 @@ def assemble_detailed(
     *,
     gaussians: int | None = None,
     strangers: Bool[Tensor, "V H W"] | None = None,
-    fineness: Float[Tensor, " V"] | None = None,
-    layered: bool = False,
     top_m: int = 8,
     preset: str = "mini",
     progress: Callable[[float], None] = lambda done: None,
@@ -93,14 +85,12 @@ def assemble_detailed(
         photos: (3, h, w) in [0, 1] of every view, `working_photo`; each may have its own size. Of many
             each is asked for several times and not kept.
         gaussians: about as many; None: as `detail` has it.
-        strangers: (V, H, W) bool, of the placed views: what gets no Gaussians, and says nothing of those of
-            others; None: nothing.
-        fineness: (V,) pixels of each placed photo in a row of a cell of the grid; None: as many in all.
-        layered: every photo covers all that it shows, whatever the others see (`splat.compose`).
+        strangers: (V, H, W) bool, of the placed views: what gets no Gaussians; None: nothing.
         progress: called with the share that is done, twice a photo; what it raises ends the work.
 
     Returns:
-        Scene with `levels`, `confidences`, `view_ids` and, in its record, `detail`.
+        Scene with `levels`, `confidences`, `view_ids` and, in its record, `detail`; of several photos one of
+        layers (`splat.compose`).
 
     Raises:
         InputError: not one usable point in view 0.
@@ -113,9 +103,9 @@ def assemble_detailed(
     prediction, views = placed_views(prediction, views)
     if not bool(torch.isfinite(prediction.viewmats).all()):
         raise ValueError("viewmats: expected finite poses, received others")
-    known, keep, unit, through = _kept(prediction, views, strangers, fineness, layered)
+    known, keep, unit = _kept(prediction, views, strangers)
     sights = _Sights(lambda v: _Sight.of(photos[v], views.images[v], known[v].log(), keep[v]), len(photos))
-    budget = gaussians or min(round(detail.most * _area(keep, layered)), MOST_OF_LAYERS)
+    budget = gaussians or min(round(detail.most * int(keep.sum())), MOST_OF_LAYERS)
     trees, limit = _trees(sights, detail, budget, 0.0 if gaussians else detail.gain, progress)
     made, weights, parts = _made(prediction, views, _told(sights, progress, 0.5), trees, limit, top_m)
     size = sights[0].size
@@ -131,10 +121,10 @@ def assemble_detailed(
         confidences=_confidences(prediction, parts),
         record=Record(
             preset=preset,
-            layered=layered,
+            layered=len(parts) > 1,
             photos=views.names,
             warnings=(*views.warnings, *prediction.warnings),
-            counts={"predicted": keep.numel(), "covered": int(keep.sum()), "seen_through": through},
+            counts={"predicted": keep.numel(), "covered": int(keep.sum())},
             detail=_spent(joined(parts), detail, budget, size),
             left_out=left_out,
             network_unit=unit,
@@ -201,49 +191,16 @@ class _Sights(Sequence[_Sight]):
         return self._known[index]
 
 
-def _area(keep: Tensor, layered: bool) -> float:
-    """Cells (V, H, W) that a budget counts: of layers all; else a photo and a quarter of each further one,
-    but of many at most `_FINENESS` times what they cover: photos that show the same again need no more."""
-    if layered:
-        return float(keep.sum())
-    usual = keep[0].numel() * (len(keep) + 3) / 4
-    return usual if len(keep) <= 2 else min(usual, _FINENESS * float(keep.sum()))
-
-
-def _kept(
-    prediction: Prediction, views: Views, strangers: Tensor | None, fineness: Tensor | None, layered: bool
-) -> tuple[Tensor, Tensor, float, int]:
-    """Depths (V, H, W) with what is no number put right; cells (V, H, W) bool that each photo covers itself;
-    the scene's unit; how many cells others see through."""
+def _kept(prediction: Prediction, views: Views, strangers: Tensor | None) -> tuple[Tensor, Tensor, float]:
+    """Depths (V, H, W) with what is no number put right; cells (V, H, W) bool that get elements; the scene's
+    unit."""
     usable = torch.isfinite(prediction.depths) & (prediction.depths > 0)
     middle = prediction.depths[usable].median() if bool(usable.any()) else torch.tensor(1.0)
     depths = torch.where(usable, prediction.depths, middle)
-    Ks = views.Ks.to(depths)
-    points = _points(depths, prediction.viewmats, Ks)
-    nowhere = torch.where(usable.flatten(1)[..., None], points, torch.nan)
-    unit = mean_distance(nowhere[0], prediction.viewmats[0])
-    if layered:
-        return depths, usable, unit, 0
-    trusts = prediction.confidences
-    if strangers is not None:
-        usable, trusts = usable & ~strangers, trusts * ~strangers
-    keep, through = _covering(depths, prediction.viewmats, Ks, usable, trusts, points, fineness)
-    return depths, keep, unit, through
-
-
-def covering(
-    depths: Float[Tensor, "V H W"],
-    viewmats: Float[Tensor, "V 4 4"],
-    Ks: Float[Tensor, "V 3 3"],
-    usable: Bool[Tensor, "V H W"],
-    trusts: Float[Tensor, "V H W"],
-) -> Bool[Tensor, "V H W"]:
-    """(V, H, W) bool: the cells that each photo covers itself where all make one surface.
-
-    Args:
-        depths: (V, H, W) > 0. usable: where they show something. trusts: how sure they are, in [0, 1].
-    """
-    return _covering(depths, viewmats, Ks, usable, trusts, _points(depths, viewmats, Ks), None)[0]
+    points = _points(depths[:1], prediction.viewmats[:1], views.Ks[:1].to(depths))[0]
+    nowhere = torch.where(usable[0].flatten()[:, None], points, torch.nan)
+    unit = mean_distance(nowhere, prediction.viewmats[0])
+    return depths, usable if strangers is None else usable & ~strangers, unit
 
 
 def _points(depths: Tensor, viewmats: Tensor, Ks: Tensor) -> Tensor:
@@ -251,18 +208,6 @@ def _points(depths: Tensor, viewmats: Tensor, Ks: Tensor) -> Tensor:
     poses = invert_rigid(viewmats)
     pos_c = unproject(depths, Ks).flatten(1, 2)
     return pos_c @ poses[:, :3, :3].transpose(1, 2) + poses[:, None, :3, 3]
-
-
-def _covering(
-    depths: Tensor, viewmats: Tensor, Ks: Tensor, usable: Tensor, trusts: Tensor, points: Tensor,
-    fineness: Tensor | None,
-) -> tuple[Tensor, int]:  # fmt: skip
-    """Cells (V, H, W) bool that each photo covers itself, of points (V, H W, 3) in the world; how many others
-    see through."""
-    through = seen_through(points.flatten(0, 1), viewmats, Ks, depths, trusts).view_as(usable)
-    between = outvoted(points, viewmats, Ks, depths)
-    keep = owned(depths, viewmats, Ks, usable & ~through & ~between, fineness)
-    return filled(depths, viewmats, Ks, keep, usable, between), int((through | between).sum())
 
 
 def _trees(

@@ -17,7 +17,6 @@ from itertools import pairwise
 
 import numpy as np
 import scipy.sparse
-from jaxtyping import Bool, Float
 
 from langflash_core.splat.projection import ALPHA_MAX, Footprints
 from langflash_core.types import Camera
@@ -43,35 +42,18 @@ def mixing(
     count: int,
     faint: float = FAINT,
     small: float = SMALL,
-    wanted: Bool[np.ndarray, "H W"] | None = None,
 ) -> scipy.sparse.csr_matrix:
     """Contributions (H*W, N) float32 of N Gaussians to the pixels of a view, row by row, front to back.
 
     Args:
         footprints: of the Gaussians as the camera sees them. count: N.
         faint, small: alpha and contribution below which a pair is left out; 1/255 and 0 as in pictures.
-        wanted: (H, W) bool, pixels whose rows are asked for, the others' are empty; None: all.
     """
-    return mixed(footprints, camera, count, faint, small, wanted)[0]
-
-
-def mixed(
-    footprints: Footprints,
-    camera: Camera,
-    count: int,
-    faint: float = FAINT,
-    small: float = SMALL,
-    wanted: Bool[np.ndarray, "H W"] | None = None,
-) -> tuple[scipy.sparse.csr_matrix, Float[np.ndarray, " HW"]]:
-    """As `mixing`, and the light (H*W,) that stays at each pixel, those of `small` contributions included;
-    1 where a pixel is not wanted."""
     table = _Table.of(footprints, camera, faint)
     light = np.zeros(camera.width * camera.height)  # logarithm of what passes all slabs so far
-    if wanted is not None:
-        light[~wanted.ravel()] = -np.inf
     layers = []
     for rows in np.array_split(np.arange(len(table.sides)), _slabs(len(table.sides))):
-        clear = light >= math.log(max(small, 1e-30)) if wanted is not None or (small > 0 and layers) else None
+        clear = light >= math.log(max(small, 1e-30)) if small > 0 and layers else None
         if clear is not None:
             rows = rows[table.seen(rows, clear.reshape(camera.height, camera.width))]
         alphas, pixels, starts = _pairs(table, rows, camera, faint, clear)
@@ -81,7 +63,7 @@ def mixed(
         layers.append((shares, rows[columns], counts))
     shares, columns, ends = _joined(layers)
     ids = footprints.ids.cpu().numpy().astype(np.int32)
-    return scipy.sparse.csr_matrix((shares, ids[columns], ends), shape=(len(light), count)), -np.expm1(light)
+    return scipy.sparse.csr_matrix((shares, ids[columns], ends), shape=(len(light), count))
 
 
 def _slabs(count: int) -> int:

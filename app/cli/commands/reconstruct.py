@@ -114,7 +114,6 @@ def _written(args: Namespace, films: Sequence[dict[str, Any]]) -> "Scene":
             grouping=args.grouping,
             detail=args.detail,
             gaussians=args.gaussians,
-            layers=args.layers,
             refine_seconds=args.refine,
             keep=args.keep,
             progress=told,

@@ -351,7 +351,7 @@ def _add_real(actions) -> None:
     command.add_argument(
         "--photos", type=whole_count, nargs="+", metavar="N", help="of a scene (default: 4 8 16, if so many)"
     )
-    command.add_argument("--layers", action="store_true", help="each photo keeps a whole layer of its own")
+    command.add_argument("--fused", action="store_true", help="judge the one surface that splat files get")
     command.add_argument("--no-own", action="store_true", help="leave out what fewer photos bring alone")
     command.add_argument("--lpips", type=Path, metavar="FILE", help="LPIPS weights of VGG-16, .safetensors")
     command.add_argument("--sheet", type=Path, metavar="IMG", help="also frames and scenes, as .png")

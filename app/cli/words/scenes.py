@@ -66,12 +66,6 @@ def add_reconstruct(commands) -> None:
     add_network(command)
     add_detail(command)
     command.add_argument(
-        "--layers",
-        action="store_true",
-        help="every photo keeps a whole layer of its own, and a view is blended from the nearest ones: "
-        "sharper, and more Gaussians; preset mini",
-    )
-    command.add_argument(
         "--aggregation",
         choices=AGGREGATIONS,
         help="how a group gets its vector: trained, the average of dense features, or CLIP on a cut-out "

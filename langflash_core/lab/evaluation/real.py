@@ -21,6 +21,7 @@ from PIL import Image, ImageOps
 from torch import Tensor
 
 from langflash_core.errors import InputError
+from langflash_core.fused import fused
 from langflash_core.images.pictures import centre_box
 from langflash_core.lab.evaluation.labelled import Render
 from langflash_core.lab.evaluation.lpips import Lpips
@@ -45,13 +46,14 @@ Shown = Callable[[str, str, str, Tensor], None]
 
 @dataclass(frozen=True)
 class Bench:
-    """What scenes are made and judged with. render: draws one in the light of the place. layers: as
-    `reconstruct` has it. alone: whether fewer photos stand beside. lpips: None leaves it out."""
+    """What scenes are made and judged with. render: draws one in the light of the place. fused: judged
+    is the one surface that formats of splats get (`langflash_core.fused`). alone: whether fewer photos stand
+    beside. lpips: None leaves it out."""
 
     render: Render
     weights: Path | None = None
     size: int | None = None
-    layers: bool = False
+    fused: bool = False
     alone: bool = True
     lpips: Lpips | None = None
     networks: Networks = field(default_factory=Networks, repr=False, compare=False)
@@ -163,12 +165,11 @@ def _made(frames: Sequence[Path], walk: _Walk, bench: Bench) -> Scene:
         frames,
         weights=bench.weights,
         size=bench.size,
-        layers=bench.layers,
         viewmats=walk.viewmats_of(frames),
         intrinsics=walk.lens,
         networks=bench.networks,
     )
-    return wordless(scene)
+    return wordless(fused(scene) if bench.fused else scene)
 
 
 def _fewer(frame: Path, kept: Sequence[Path], walk: _Walk, bench: Bench) -> Scene:

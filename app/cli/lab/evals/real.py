@@ -41,7 +41,7 @@ def real(args: Namespace, out: TextIO) -> None:
             colour_only(renderer),
             args.weights,
             args.size,
-            args.layers,
+            args.fused,
             not args.no_own,
             opened_lpips(args.lpips),
         )
