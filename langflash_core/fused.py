@@ -2,28 +2,74 @@
 know no layers. Of several layers that show a surface one keeps it; the scene itself loses nothing.
 
 Each layer is drawn from its own photo's place, and of these depth maps it is decided which photo covers which
-surface (`scene.ownership`): a Gaussian goes where its cell belongs to another photo, or is seen through.
+surface (`scene.ownership`): a Gaussian goes where its cell belongs to another photo, or is seen through. What
+stays takes the colours that make the pictures of all layers again: solved for in each (`splat.colours`), and
+of these the mean, by what a Gaussian contributes to each. (Of nine photos of a film, frames between: solved
+for in all pictures together 25.4 dB and .36 of their structure, the mean 25.9 and .42.)
 """
 
+from dataclasses import replace
+
+import numpy as np
 import torch
 from jaxtyping import Bool, Float
 from torch import Tensor
 
+from langflash_core.at_once import at_once
 from langflash_core.geometry.cameras import invert_rigid, pictured, unproject
+from langflash_core.geometry.harmonics import colour_to_sh, sh_to_colour
 from langflash_core.scene.consistency import outvoted, seen_through
 from langflash_core.scene.ownership import filled, owned
+from langflash_core.splat.colours import Solved, solved_colours
+from langflash_core.splat.mixing import mixing
 from langflash_core.splat.projection import drawable_rows, project, view_depths
 from langflash_core.splat.tiles import rasterize_tiles
-from langflash_core.types import Scene
+from langflash_core.types import Camera, Scene
 
 _SHOWN = 0.5  # alpha from which a cell shows the layer
+_SEEN = 0.05  # pixels that a Gaussian contributes to all pictures, below which its colour stays
+_STEP = 1 / 255  # colour: the least range in which colours are solved for
 
 
 def fused(scene: Scene) -> Scene:
     """The scene as one surface; as it is where it has no layers."""
     if not scene.layered:
         return scene
-    return scene.rows(fused_rows(scene)).with_record(layered=False)
+    whole = scene.rows(fused_rows(scene)).with_record(layered=False)
+    sh = torch.cat((colour_to_sh(_colours(scene, whole))[:, None], whole.gaussians.sh[:, 1:]), 1)
+    return replace(whole, gaussians=replace(whole.gaussians, sh=sh))
+
+
+@torch.no_grad()
+def _colours(scene: Scene, whole: Scene) -> Float[Tensor, "n 3"]:
+    """Of a scene's one surface."""
+    start = sh_to_colour(whole.gaussians.sh, whole.gaussians.means)
+    if len(start) == 0:
+        return start
+    ends = sh_to_colour(scene.gaussians.sh, scene.gaussians.means).nan_to_num(0.5)
+    low, high = ends.amin(0), ends.amax(0).maximum(ends.amin(0) + _STEP)
+    size = tuple(scene.record.detail.get("photo_size", scene.view_size))
+
+    def solved(view: int) -> Solved:
+        layer, camera = scene.layer(view), scene.camera(view, *size)
+        picture = (_picture(layer, camera) - low[:, None, None]) / (high - low)[:, None, None]
+        return solved_colours(whole.gaussians, (start - low) / (high - low), camera, picture)
+
+    sums, seen = torch.zeros_like(start), start.new_zeros(len(start), 1)
+    for found in at_once(solved, range(scene.num_views)):
+        sums += found.seen[:, None] * found.colours
+        seen += found.seen[:, None]
+    mean = low + (high - low) * sums / seen.clamp_min(_SEEN)
+    return torch.where(seen > _SEEN, mean, start)
+
+
+def _picture(layer: Scene, camera: Camera) -> Float[Tensor, "3 h w"]:
+    """A layer from its photo's place; no number where it shows nothing."""
+    matrix = mixing(project(layer.gaussians, camera), camera, len(layer.gaussians))
+    light = torch.from_numpy(np.asarray(matrix.sum(1)))
+    sums = torch.from_numpy(matrix @ sh_to_colour(layer.gaussians.sh, layer.gaussians.means).numpy())
+    flat = torch.where(light >= _SHOWN, sums / light.clamp_min(_SHOWN), torch.nan)
+    return flat.T.reshape(3, camera.height, camera.width)
 
 
 @torch.no_grad()

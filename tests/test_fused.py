@@ -6,7 +6,7 @@ import torch
 
 from langflash_core.fused import fused, fused_rows
 from langflash_core.splat import render
-from tests.splat.test_compose import layered
+from tests.splat.test_compose import SIZE, layered
 
 
 def test_of_two_layers_that_show_one_wall_one_keeps_it():
@@ -17,6 +17,15 @@ def test_of_two_layers_that_show_one_wall_one_keeps_it():
     camera = scene.camera(0)
     alphas = [render(each, camera).alphas for each in frames]
     assert float(alphas[1].min()) > 0.9 * float(alphas[0].min())  # as closed as one layer
+
+
+def test_its_colours_make_the_pictures_of_all_layers():
+    """Two layers show one wall, grey of .3 and of .5: one surface of it is between both."""
+    scene = layered([(2, 0.3, 0), (2, 0.5, 1)], [0, 0.2])
+    whole = fused(scene)
+    for view, grey in enumerate((0.3, 0.5)):
+        drawn = render(whole, scene.camera(view)).rgb
+        assert abs(float(drawn[SIZE // 4 : -SIZE // 4, SIZE // 4 : -SIZE // 4].mean()) - grey) < 0.15
 
 
 def test_what_no_photo_made_stays():

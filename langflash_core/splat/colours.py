@@ -32,10 +32,11 @@ _SEEN = 0.05  # contributions of a Gaussian over all pixels, below which its col
 
 @dataclass(frozen=True)
 class Solved:
-    """colours: (N, 3) in [0, 1]. psnr: dB of the picture beside the photo before the rounds and after them,
-    where something is drawn."""
+    """colours: (N, 3) in [0, 1]. seen: (N,) what each contributes to the picture, pixels. psnr: dB of the
+    picture beside the photo before the rounds and after them, where something is drawn."""
 
     colours: Float[Tensor, "N 3"]
+    seen: Float[Tensor, " N"]
     psnr: tuple[float, float]
 
 
@@ -56,11 +57,12 @@ def solved_colours(
     """
     first = start.detach().cpu().numpy().astype(np.float32)
     footprints = project(gaussians.map(lambda values: values.float()), camera)
-    seen, matrix = _narrowed(mixing(footprints, camera, len(first)))
+    some, matrix = _narrowed(mixing(footprints, camera, len(first)))
     drawn = _Drawn.of(matrix, photo)
-    colours = first.copy()
-    colours[seen] = drawn.solved(first[seen], rounds)
-    return Solved(torch.from_numpy(colours), (drawn.psnr(first[seen]), drawn.psnr(colours[seen])))
+    colours, seen = first.copy(), np.zeros(len(first), np.float32)
+    colours[some], seen[some] = drawn.solved(first[some], rounds), drawn.sums[:, 0]
+    psnr = drawn.psnr(first[some]), drawn.psnr(colours[some])
+    return Solved(torch.from_numpy(colours), torch.from_numpy(seen), psnr)
 
 
 @dataclass(frozen=True)
