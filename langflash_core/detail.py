@@ -14,7 +14,7 @@ FEWEST, MOST = 1_000, 4_000_000
 
 @dataclass(frozen=True)
 class Detail:
-    """One level. most: Gaussians a pixel of the network's grid, of one photo and a quarter for each other.
+    """One level. most: Gaussians a pixel of the network's grid.
     gain: squared error of three channels that one more Gaussian must take away from the photo, colours in
     [0, 1]: count follows what there is to see. finest: side of the smallest element, pixels of the photo."""
 
