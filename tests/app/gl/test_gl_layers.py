@@ -496,6 +496,17 @@ def test_a_still_picture_agrees_with_the_reference(num_views):
     assert (answered - full_relevance(scene, asked, maps_of(expected))).abs().mean() < 2e-3
 
 
+def test_a_still_picture_of_two_layers_is_blended_of_the_nearest():
+    scene, seen = layered(6), between(6)
+    still = draw_still(scene, seen, most=2)
+    chosen = compose.Nearness.of(scene).chosen(seen, 2)
+    frames = [reference.render(doubled(scene).layer(view), seen) for view in chosen.views]
+    expected = compose.blended(frames, chosen.weights)
+    assert psnr(still.frame.rgb, expected.rgb) >= 60 and still.maps is not None  # as above
+    assert (still.maps.weights.double() - maps_of(expected)).abs().mean() < 2e-4
+    assert psnr(compose.render(doubled(scene), seen).rgb, expected.rgb) < 40
+
+
 def test_a_still_picture_is_the_renderers_marked_and_carried(gl):
     scene, seen = layered(3), between(3)
     random, count = np.random.default_rng(0), len(scene.gaussians)
