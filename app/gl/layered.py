@@ -61,13 +61,14 @@ class LayeredLevel:
             quick: `MOVING` of them, all but the nearest in half the size.
         """
         chosen = self._chosen(camera, quick)
-        self.parts = tuple(self._layer(view) for view in chosen.views)
-        self.halved = quick and len(self.parts) > 1
-        for place, part in enumerate(self.parts):
-            part.prepare(half(camera) if self.halved and place else camera)
-        self.weights = None if len(self.parts) == 1 else chosen.weights
+        first, *others = parts = [self._layer(view) for view in chosen.views]
+        first.prepare(camera)
+        for part in others:
+            part.prepare(half(camera) if quick else camera)
+        self.parts, self.halved = tuple(parts), quick and bool(others)
+        self.weights = chosen.weights if others else None
         if self.weights is None:
-            self.order_key, self.places_key = self.parts[0].order_key, self.parts[0].places_key
+            self.order_key, self.places_key = first.order_key, first.places_key
             self._named = self._placed = ()
         else:
             self._name(self.weights.tobytes())

@@ -202,7 +202,7 @@ def test_what_blends_layers_is_compiled_ahead_alone(gl) -> None:
     assert max(np.diff([*counts, len(programs)])) == 1 and "blend.frag" in str(programs.keys())
     begun = warm_layers(renderer.canvas)
     next(begun)
-    begun.close()
+    del begun
     renderer.release()
     assert buffers() == before and gl.error == "GL_NO_ERROR"
 
