@@ -1,7 +1,5 @@
 """The splat pass that every picture begins with: colour and depth, in the fast mode numbers beside them."""
 
-from collections.abc import Sequence
-
 import moderngl
 import numpy as np
 
@@ -14,31 +12,18 @@ from .targets import PREMULTIPLIED, drawing
 
 def draw_colour(
     programs: Programs,
-    splats: Sequence[SplatBuffers],
-    into: moderngl.Framebuffer,
-    numbers: Sequence[np.ndarray] | None = None,
-    depth: bool = True,
-) -> None:
-    """Splat Gaussians, ordered and projected, into a framebuffer whose size the projection was for.
-
-    Args:
-        splats: the first over the next.
-        numbers: of each, (N, 3 L) that the Gaussians carry into L layers behind colour and depth.
-        depth: whether the framebuffer has it beside the colour; without, there are no numbers.
-    """
-    into.clear()
-    for place in reversed(range(len(splats))):
-        _draw(programs, splats[place], into, None if numbers is None else numbers[place], depth)
-
-
-def _draw(
-    programs: Programs,
     splats: SplatBuffers,
     into: moderngl.Framebuffer,
-    numbers: np.ndarray | None,
-    depth: bool,
+    numbers: np.ndarray | None = None,
+    depth: bool = True,
 ) -> None:
-    """Over what is there."""
+    """Splat Gaussians, ordered and projected, into a framebuffer of the size that the projection was for, or
+    into the corner of a larger one.
+
+    Args:
+        numbers: (N, 3 L), that the Gaussians carry into L layers behind colour and depth.
+        depth: whether the framebuffer has it beside the colour; without, there are no numbers.
+    """
     defines = {"COLOUR": 1, **splats.shapes.defines}
     num_layers = 0 if numbers is None else numbers.shape[1] // ATOMS_A_LAYER
     if not depth:
@@ -47,6 +32,7 @@ def _draw(
         defines["LAYERS"] = num_layers
     program = programs.get("quad.vert", "colour.frag", defines)
     set_uniforms(program, image_size=tuple(float(n) for n in into.size))
+    into.clear()
     with drawing(into, PREMULTIPLIED):
         if len(splats.order):
             carried = None if numbers is None else splats.in_order(numbers)

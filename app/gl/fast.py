@@ -9,21 +9,16 @@ the same where the Gaussians of a pixel agree; where they do not, edges are a li
 that is on a scene, `langflash bench` says.
 """
 
-from collections.abc import Sequence
-
 import moderngl
 import numpy as np
 
 from langflash_core.language.relevance import EMPTY_NORM, CompiledQuery
 
 from .answers import temperature_of
-from .blend import add_maps
 from .layout import ATOMS_A_LAYER, LAYERS_A_PASS, PHRASES_A_LAYER, num_groups, num_layers
-from .level import Prepared
 from .painter import Painter
 from .splats import SplatBuffers
-from .targets import ColourTarget, Layers, LayerTarget
-from .weights import splat_weights
+from .targets import ColourTarget, LayerTarget
 
 MAX_PHRASES = ATOMS_A_LAYER * (LAYERS_A_PASS - 2) - 1
 """Colour and depth take two attachments, |f| one number of the rest."""
@@ -51,7 +46,8 @@ def splat_numbers(splats: SplatBuffers, compiled: CompiledQuery, norms: np.ndarr
 class FastPasses:
     """Owns the layers that the numbers of so many phrases are splatted into, and the relevance made of them.
 
-    `framebuffer` has the layers beside a target's colour and depth; who draws into it says so in `shows`.
+    numbers: the layers. framebuffer: these beside a target's colour and depth. Who draws into them says so in
+    `shows`.
     """
 
     def __init__(self, painter: Painter, target: ColourTarget, dtype: str, num_phrases: int):
@@ -61,24 +57,10 @@ class FastPasses:
         self.relevance = LayerTarget(painter.ctx, size, num_groups(num_phrases), "f4")
         self.shows: tuple[int, int] = (0, 0)  # places and question
         self._painter = painter
-        self._numbers = LayerTarget(painter.ctx, size, self.num_layers, dtype)
-        self._own = Layers(painter.ctx, size, dtype)  # numbers of one part of a level that is blended
-        self.framebuffer: moderngl.Framebuffer = self._numbers.layers(
+        self.numbers = LayerTarget(painter.ctx, size, self.num_layers, dtype)
+        self.framebuffer: moderngl.Framebuffer = self.numbers.layers(
             0, self.num_layers, beside=(target.colour, target.depth)
         )
-
-    def blend(self, level: Prepared, numbers: Sequence[np.ndarray], shares: moderngl.Texture) -> None:
-        """The numbers (N, 3 L) of each part times what it counts in each pixel, which is drawn already."""
-        into = self._numbers.layers(0, self.num_layers)
-        into.clear()
-        for place, part in enumerate(level.parts):
-            own = self._own.exactly(self.num_layers)
-            alone = own.layers(0, self.num_layers)
-            alone.clear()
-            if len(part.splats.order):
-                carried = part.splats.in_order(numbers[place])
-                splat_weights(self._painter, part.splats, carried, self.num_layers, alone)
-            add_maps(self._painter, own, 0, self.num_layers, shares, place, into)
 
     def run(self, compiled: CompiledQuery) -> None:
         """Make `relevance` (4 phrases a layer, float32) of what was splatted last."""
@@ -86,12 +68,11 @@ class FastPasses:
             self._painter.fill(
                 self.relevance.layers(group, 1),
                 "fast.frag",
-                {"numbers": self._numbers.array},
+                {"numbers": self.numbers.array},
                 {"first_phrase": PHRASES_A_LAYER * group, "temperature": temperature_of(compiled)},
                 {"EMPTY_NORM": EMPTY_NORM},
             )
 
     def release(self) -> None:
         self.relevance.release()
-        self._numbers.release()
-        self._own.release()
+        self.numbers.release()

@@ -18,17 +18,17 @@ from .weights import MakeMaps, WeightMaps
 @dataclass(frozen=True)
 class Hardware:
     """shapes: what Gaussians are drawn as. maps: how weight maps come about. answers: who multiplies them
-    with phrases. blends: whether layers of a scene are blended in moving pictures too, and not only the
-    nearest one drawn over the next. defines: of all shaders."""
+    with phrases. blends_all: whether moving pictures of a scene of layers are blended of as many as resting
+    ones, and not of few and smaller ones (layered.py). defines: of all shaders."""
 
     shapes: MakeShapes
     maps: MakeMaps
     answers: MakeAnswers
-    blends: bool
+    blends_all: bool
     defines: Mapping[str, float] = field(default_factory=dict)
 
 
-CARD = Hardware(Quads, WeightMaps, ShaderAnswers, blends=True)
+CARD = Hardware(Quads, WeightMaps, ShaderAnswers, blends_all=True)
 PROCESSOR = Hardware(Sprites, CellMaps, HostAnswers, False, {"SOFTWARE": 1})
 
 

@@ -17,8 +17,8 @@ _names = count(1)  # each given once, so that no two contents are ever taken for
 
 
 class Prepared(Protocol):
-    """What a view draws: parts, each splatted into a picture of its own and blended by `weights`
-    (langflash_core/splat/compose.py), or without these all into one, the first over the next.
+    """What a view draws: one part, or several, each splatted into a picture of its own and blended by
+    `weights` (langflash_core/splat/compose.py).
 
     `order_key` names the Gaussians and their order, `places_key` also their footprints and colours:
     what was drawn from another order or other places shows another key.
@@ -29,7 +29,12 @@ class Prepared(Protocol):
 
     @property
     def weights(self) -> np.ndarray | None:
-        """(L,), of so many parts, in sum 1."""
+        """(L,), of so many parts, in sum 1; None of one part alone."""
+        ...
+
+    @property
+    def halved(self) -> bool:
+        """Whether all parts but the first are projected for half the picture's sides."""
         ...
 
     @property
@@ -43,6 +48,7 @@ class Level:
     """A share of a scene's Gaussians, ordered and projected for one camera at a time; its only part."""
 
     weights: np.ndarray | None = None
+    halved = False
 
     def __init__(self, splats: SplatBuffers, rows: np.ndarray, gaussians: Gaussians):
         """rows: of the scene's N Gaussians, that this level draws. gaussians: as it draws them."""
@@ -59,9 +65,9 @@ class Level:
     def parts(self) -> "tuple[Level, ...]":
         return (self,)
 
-    def prepare(self, camera: Camera, moving: bool = False) -> None:
-        """Order and project the Gaussians, unless they are for this camera and these marks; in a moving
-        picture too."""
+    def prepare(self, camera: Camera, quick: bool = False) -> None:
+        """Order and project the Gaussians, unless they are for this camera and these marks; the same
+        where it is to be quick."""
         if self._changes is not None:
             self.splats.place(changed(self._gaussians, self._changes, torch.from_numpy(self._rows)))
             self._changes = None
@@ -73,6 +79,10 @@ class Level:
             if len(self.splats.order):
                 self.splats.project(camera)
             self._projected, self.places_key = True, new_name()
+
+    def ready(self, camera: Camera, quick: bool = False) -> bool:
+        """As `LayeredLevel.ready`: all that it draws is there."""
+        return True
 
     def mark(self, shown: np.ndarray, tints: np.ndarray) -> None:
         """Bring the scene's marks to this level: shown (N,) bool, tints (N,) uint8."""

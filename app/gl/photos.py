@@ -123,7 +123,7 @@ def _depths(painter: Painter, splats: SplatBuffers, camera: Camera) -> np.ndarra
         splats.sort(camera)
     if len(splats.order):
         splats.project(camera)
-    draw_colour(painter.programs, [splats], target.framebuffer)
+    draw_colour(painter.programs, splats, target.framebuffer)
     sums = np.frombuffer(target.depth.read(), np.float32).reshape(camera.height, camera.width, 2)
     target.release()
     alphas = sums[..., 1]

@@ -104,10 +104,12 @@ class SplatRenderer:
         if self._scene is not None and self._scene.scene is scene:
             self._scene.give(share, thinned, rows)
 
-    def upload(self, share: float) -> None:
-        """Bring this share of the Gaussians to the card now, not with the next picture."""
-        if self._scene is not None:
-            self._scene.level(share)
+    def upload(self, camera: Camera, share: float = 1.0, moving: bool = False) -> bool:
+        """Bring what a picture so drawn lacks to the card, one layer of the scene at the most; whether all of
+        it is there."""
+        if self._scene is None:
+            return True
+        return self._scene.level(share).ready(camera, self._quick(moving or share < 1))
 
     def mark(self, shown: np.ndarray, tints: np.ndarray) -> None:
         """Draw only some Gaussians, and some in a tint (`splats.TINTS`); holds until `set_scene`.
@@ -156,11 +158,11 @@ class SplatRenderer:
         weight_maps: bool = True,
         fast: bool = False,
         share: float = 1.0,
+        moving: bool = False,
     ) -> None:
         """Draw the scene; nothing is drawn again for the same scene, camera and size.
 
-        A layered scene is blended of the layers nearest to the camera (langflash_core/splat/compose.py);
-        on a processor `fast`, or a share of it, is the nearest layer over the next, which fills its holes.
+        A layered scene is blended of the layers nearest to the camera (langflash_core/splat/compose.py).
 
         Args:
             weight_maps: draw them at once; else the first question that needs them does.
@@ -169,12 +171,14 @@ class SplatRenderer:
                 up to 17 phrases; more are answered exactly.
             share: in (0, 1], of the Gaussians to draw, wider in return (scene/thin.py). A level is
                 made once and kept with the scene: use few values.
+            moving: the picture is gone in a moment, as one that is `fast` or of a share is: on a processor
+                it is blended of two layers, the farther one in half the size.
 
         Raises:
             ValueError: there is no scene, or the image has no pixels.
             GraphicsError: the image is larger than the driver's textures, or the context is gone.
         """
-        scene, level, view = self._prepared(camera, share, self._moves(fast, share))
+        scene, level, view = self._prepared(camera, share, self._quick(moving or fast or share < 1))
         drawn = Drawn(view.colour, camera, background, level.places_key, self._fill)
         picture = DrawnPicture(scene, view, drawn, level, fast, level.depth_range)
         if self._question is not None and fast and self._question.fits_fast:
@@ -451,7 +455,7 @@ class SplatRenderer:
     # --- inside -------------------------------------------------------------------------------
 
     def _prepared(
-        self, camera: Camera, share: float, moving: bool = False
+        self, camera: Camera, share: float, quick: bool = False
     ) -> tuple[LiveScene, Level | LayeredLevel, ViewTargets]:
         """What to draw, sorted and projected, and where.
 
@@ -464,12 +468,12 @@ class SplatRenderer:
             raise ValueError("draw: expected set_scene before, received no scene")
         view = self._canvas.view((camera.width, camera.height))
         level = self._scene.level(share)
-        level.prepare(camera, moving)
+        level.prepare(camera, quick)
         return self._scene, level, view
 
-    def _moves(self, fast: bool, share: float) -> bool:
-        """Whether a picture is to be quick rather than blended."""
-        return (fast or share < 1) and not self._canvas.hardware.blends
+    def _quick(self, moving: bool) -> bool:
+        """Whether a moving picture has fewer and smaller layers than one at rest."""
+        return moving and not self._canvas.hardware.blends_all
 
     def _drawn(self) -> Picture:
         """The picture asked for last; drawn again where another renderer of this canvas drew since."""

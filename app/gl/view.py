@@ -61,18 +61,19 @@ class ViewTargets:
         self,
         level: Prepared,
         into: moderngl.Framebuffer,
-        numbers: Sequence[np.ndarray] | None = None,
+        numbers: np.ndarray | None = None,
         depth: bool = True,
     ) -> None:
-        splats = [part.splats for part in level.parts]
-        draw_colour(self._painter.programs, splats, into, numbers, depth)
-        self._painter.passes["colour"] += len(splats)
+        (part,) = level.parts
+        draw_colour(self._painter.programs, part.splats, into, numbers, depth)
+        self._painter.passes["colour"] += 1
 
-    def _blended(self, level: Prepared) -> None:
+    def _blended(
+        self, level: Prepared, numbers: Sequence[np.ndarray] = (), into: LayerTarget | None = None
+    ) -> None:
         if self._blend is None:
             self._blend = Blend(self._painter, self.colour, self._dtype)
-        self._blend.draw(level)
-        self._painter.passes["colour"] += len(level.parts)
+        self._blend.draw(level, numbers, into)
 
     def _shares(self, level: Prepared) -> moderngl.Texture | None:
         """What each part of a level that is blended counts in each pixel."""
@@ -122,18 +123,16 @@ class ViewTargets:
         return self.answers(question.answers).run(question.compiled, self.weight_maps(level))
 
     def fast(self, question: Question, level: Prepared) -> LayerTarget:
-        """Relevance from numbers beside the colour: all three in one splat pass of each part, one over the
-        other, or in one more where parts are blended, unless they are there."""
+        """Relevance from numbers beside the colour: all three in one splat pass of each part, unless they are
+        there."""
         passes = self.fast_passes(question.num_phrases)
         shown = (level.places_key, question.key)
         if passes.shows != shown:
             numbers = [question.numbers(part) for part in level.parts]
-            shares = self._shares(level)
-            if shares is None:
-                self._splat(level, passes.framebuffer, numbers)
+            if level.weights is None:
+                self._splat(level, passes.framebuffer, numbers[0])
             else:
-                passes.blend(level, numbers, shares)
-                self._painter.passes["colour"] += len(numbers)
+                self._blended(level, numbers, passes.numbers)
             self._shown, passes.shows = level.places_key, shown
             passes.run(question.compiled)
         return passes.relevance

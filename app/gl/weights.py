@@ -90,8 +90,7 @@ class WeightMaps:
             target = layers.layers(first // ATOMS_A_LAYER, count)
             target.clear()
             if shares is None:
-                for part in reversed(level.parts):
-                    self._draw(part.splats, target, atoms, first, count)
+                self._draw(level.parts[0].splats, target, atoms, first, count)
             else:
                 self._add(level, shares, target, atoms, first, count)
         return Maps(layers, atoms, level.order_key)
@@ -111,7 +110,7 @@ class WeightMaps:
             alone = own.layers(0, count)
             alone.clear()
             self._draw(part.splats, alone, atoms, first, count)
-            add_maps(self.painter, own, 0, count, shares, place, target)
+            add_maps(self.painter, own, 0, count, shares, place, target, level.halved)
 
     def _draw(
         self, splats: SplatBuffers, target: moderngl.Framebuffer, atoms: np.ndarray, first: int, count: int

@@ -6,7 +6,7 @@ a resting picture is a query pass and no splat pass. No torch before the first s
 
 import logging
 from collections.abc import Callable, Iterator
-from contextlib import suppress
+from contextlib import contextmanager, suppress
 from typing import TYPE_CHECKING
 
 import moderngl
@@ -73,16 +73,27 @@ class Viewport:
         """Compile shaders while there is no scene, one a call at the most; whether there is more to do."""
         if self.picture is not None:
             return False
-        try:
-            if self._warming is None:
+        if self._warming is None:
+            with self._said():
                 from ..gl.warming import warm_up
 
                 renderer = self._made()
                 self._warming = warm_up(renderer.canvas, renderer.splats)
-            return next(self._warming, self) is not self
+        return self._warmed()
+
+    def _warmed(self) -> bool:
+        """Go on with what is compiled ahead by a step; whether there is more to do."""
+        more = False
+        with self._said():
+            more = self._warming is not None and next(self._warming, self) is not self
+        return more
+
+    @contextmanager
+    def _said(self) -> Iterator[None]:
+        try:
+            yield
         except (GraphicsError, moderngl.Error):  # whoever needs that shader will say so
             log.exception("a shader could not be compiled ahead")
-            return False
 
     def set_scene(self, serial: int, scene: "Scene", changed: bool = False) -> None:
         """Upload a scene; the first one builds the renderer. What pictures of another took is given back.
@@ -110,6 +121,10 @@ class Viewport:
             from .drawing.card import CardPicture
 
             self.picture = CardPicture(renderer, serial, scene)
+        if scene.layered:
+            from ..gl.warming import warm_layers
+
+            self._warming = warm_layers(renderer.canvas, renderer.splats)
         self._fresh = True
 
     def _keep_look(self, changed: bool) -> None:
@@ -197,6 +212,10 @@ class Viewport:
         if self._fresh:  # to take a scene took a frame's time
             self._fresh = False
             return 0.0
+        if self._warming is not None:
+            if self._warmed():
+                return 0.0
+            self._warming = None
         wait = self.picture.update(state, self._stand, touched)
         if self._own is not None:
             self._forget_look()

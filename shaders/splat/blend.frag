@@ -7,10 +7,21 @@
 uniform sampler2D colour_0, colour_1, colour_2, colour_3;  // premultiplied
 uniform sampler2D depth_0, depth_1, depth_2, depth_3;      // sum of T alpha z, sum of T alpha
 uniform vec4 weights;                                      // w_i
+uniform bool halved;                                       // all but the first lie in half the sides in the corner
+
+#include "halved.glsl"
 
 layout(location = 0) out vec4 out_colour;
 layout(location = 1) out vec4 out_depth;  // two channels are kept
 layout(location = 2) out vec4 out_shares;
+
+vec4 farther(sampler2D layer, ivec2 pixel) {
+    if (!halved) return texelFetch(layer, pixel, 0);
+    ivec4 at = halved_texels(pixel, textureSize(layer, 0));
+    vec2 share = halved_shares(pixel);
+    return mix(mix(texelFetch(layer, at.xy, 0), texelFetch(layer, at.zy, 0), share.x),
+               mix(texelFetch(layer, at.xw, 0), texelFetch(layer, at.zw, 0), share.x), share.y);
+}
 
 void main() {
     ivec2 pixel = ivec2(gl_FragCoord.xy);
@@ -18,15 +29,13 @@ void main() {
     vec2 depths[4];
     colours[0] = texelFetch(colour_0, pixel, 0);
     depths[0] = texelFetch(depth_0, pixel, 0).rg;
-    colours[1] = texelFetch(colour_1, pixel, 0);
-    depths[1] = texelFetch(depth_1, pixel, 0).rg;
+    colours[1] = farther(colour_1, pixel);
+    depths[1] = farther(depth_1, pixel).rg;
 #if LAYERS > 2
-    colours[2] = texelFetch(colour_2, pixel, 0);
-    depths[2] = texelFetch(depth_2, pixel, 0).rg;
-#endif
-#if LAYERS > 3
-    colours[3] = texelFetch(colour_3, pixel, 0);
-    depths[3] = texelFetch(depth_3, pixel, 0).rg;
+    colours[2] = farther(colour_2, pixel);
+    depths[2] = farther(depth_2, pixel).rg;
+    colours[3] = farther(colour_3, pixel);
+    depths[3] = farther(depth_3, pixel).rg;
 #endif
     float counts[LAYERS];
     float logs[LAYERS];

@@ -24,8 +24,7 @@ _SPLATS_AT_ONCE = 1 << 17  # of cells: 13 MB of weights
 
 
 class CellMaps(WeightMaps):
-    """As `WeightMaps`; whole where there are no sprites, one part lies over another, or splats and cells make
-    too many pairs."""
+    """As `WeightMaps`; whole where there are no sprites, or splats and cells make too many pairs."""
 
     def __init__(self, painter: Painter, size: tuple[int, int], dtype: str):
         super().__init__(painter, size, dtype)
@@ -35,7 +34,7 @@ class CellMaps(WeightMaps):
     def draw(self, level: Prepared, shares: moderngl.Texture | None) -> Maps:
         found = [self._cells_of(part.splats) for part in level.parts]
         cells = [each for each in found if each is not None]
-        if len(cells) < len(found) or (shares is None and len(cells) > 1):
+        if len(cells) < len(found):
             return super().draw(level, shares)
         reached = [each.atoms for each in cells if len(each.boxes)] or [cells[0].atoms]
         atoms = together(np.concatenate(reached))
@@ -49,7 +48,7 @@ class CellMaps(WeightMaps):
                 self._draw_in(own, cells[place], part.splats, atoms)
                 for first in _passes(atoms):
                     into = layers.layers(first, LAYERS_A_PASS)
-                    add_maps(self.painter, own, first, LAYERS_A_PASS, shares, place, into)
+                    add_maps(self.painter, own, first, LAYERS_A_PASS, shares, place, into, level.halved)
         return Maps(layers, atoms, level.order_key)
 
     def _cells_of(self, splats: SplatBuffers) -> Cells | None:

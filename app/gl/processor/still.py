@@ -18,7 +18,7 @@ from torch import Tensor
 
 from langflash_core.errors import Cancelled
 from langflash_core.language.relevance import EMPTY_NORM, CompiledQuery
-from langflash_core.splat.compose import Nearness, shares
+from langflash_core.splat.compose import NEAREST, Nearness, shares
 from langflash_core.splat.projection import (
     ALPHA_MIN,
     NEAR,
@@ -163,12 +163,14 @@ def draw_still(
     marks: tuple[np.ndarray, np.ndarray] | None = None,
     weight_maps: bool = True,
     carried: Tensor | None = None,
+    most: int = NEAREST,
     threads: int = 1,
     stopping: Callable[[], bool] = lambda: False,
 ) -> Still:
     """Draw a scene as `SplatRenderer.draw` does.
 
     Args:
+        most: layers that are blended, of a scene of layers.
         carried: (N, F), composited in place of the weights.
         marks: shown (N,) bool and tints (N,) uint8, as `SplatRenderer.mark` takes them.
         threads, stopping: as `rasterize_tiles`.
@@ -178,7 +180,7 @@ def draw_still(
     """
 
     order = _Order(scene, camera, marks, weight_maps, carried, threads, stopping)
-    chosen = Nearness.of(scene).chosen(camera) if scene.layered else None
+    chosen = Nearness.of(scene).chosen(camera, most) if scene.layered else None
     kept = order.kept()
     if chosen is None or not chosen.views:
         drawn = order.splatted(kept)

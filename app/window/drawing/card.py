@@ -43,7 +43,9 @@ class CardPicture:
         resting = self.governor.resting(kind, still)
         wanted = self.easel.wanted(state, stand, resting or self.governor.moving(kind))
         if not self.easel.covers(wanted):
-            self.easel.draw(wanted)
+            if not self.easel.ready(wanted, moving=resting is None):
+                return 0.0
+            self.easel.draw(wanted, moving=resting is None)
             self.governor = self.governor.learn(wanted.plan, self.easel.seconds, moving=resting is None)
         self.easel.paint(state)
         return self.governor.next_rest(still)

@@ -100,12 +100,19 @@ class Easel:
         """Whether what is on show leaves out no pixel and no Gaussian."""
         return self.drawn is not None and self.drawn.plan.covers(Plan(self.drawn.plan.kind))
 
-    def draw(self, wanted: Drawn) -> None:
-        """Draw that picture, by the renderer."""
+    def _seen(self, wanted: Drawn) -> "Camera":
+        width, height = (max(8, round(side * wanted.plan.scale)) for side in wanted.size)
+        return self._light.lit(to_camera(wanted.pose, width, height))
+
+    def ready(self, wanted: Drawn, moving: bool) -> bool:
+        """Bring what that picture lacks to the renderer, as much as a frame has time for; whether it can be
+        drawn now."""
+        return self.renderer.upload(self._seen(wanted), wanted.plan.share, moving)
+
+    def draw(self, wanted: Drawn, moving: bool) -> None:
+        """Draw that picture, by the renderer. moving: as `SplatRenderer.draw` has it."""
         plan, renderer = wanted.plan, self.renderer
-        width, height = (max(8, round(side * plan.scale)) for side in wanted.size)
-        self.camera = self._light.lit(to_camera(wanted.pose, width, height))
-        renderer.upload(plan.share)  # once, and no matter of what pictures cost
+        self.camera = self._seen(wanted)
         start = time.perf_counter()
         self.drawn = None  # should it fail: what was drawn may have made room for it
         renderer.draw(
@@ -114,9 +121,10 @@ class Easel:
             weight_maps=plan.kind is Kind.MAPS,
             fast=plan.kind is Kind.FAST,
             share=plan.share,
+            moving=moving,
         )
         renderer.finish()  # software and hardware alike: the time of the picture, not of the call
-        self._takes(wanted, time.perf_counter() - start, (width, height))
+        self._takes(wanted, time.perf_counter() - start, (self.camera.width, self.camera.height))
 
     def bring(self, still: "Still", name: Drawn, seconds: float) -> None:
         """Show a picture so named that was drawn elsewhere."""

@@ -85,8 +85,10 @@ class ProcessorPicture:
             if wanted.plan.kind is Kind.FAST:
                 self.easel.renderer.carry(wanted.plan.share)
                 return False
+        if not self.easel.ready(wanted, moving=True):
+            return False
         first = self.easel.drawn is None
-        self.easel.draw(wanted)
+        self.easel.draw(wanted, moving=True)
         self.stills.shown = None
         self.governor = self.governor.learn(wanted.plan, self.easel.seconds)
         self._unpainted = first or self.easel.seconds > LONG_SECONDS

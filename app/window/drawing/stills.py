@@ -12,7 +12,9 @@ import torch
 
 from langflash_core.geometry.poses import to_camera
 from langflash_core.scene.exposure import lit_camera
+from langflash_core.splat.compose import NEAREST
 
+from ...gl.layered import MOVING
 from ...gl.processor.artist import Artist, Stopping, Work
 from ...gl.processor.still import Still, draw_still
 from ..governor import Kind
@@ -24,7 +26,8 @@ if TYPE_CHECKING:
     from langflash_core.types import Frame, Scene
 
 SCALES = (0.5, 1.0)
-"""Of the still pictures that follow each other."""
+"""Of the still pictures that follow each other. Of a scene of layers the smaller ones have as few as what
+moved, and come twice as soon."""
 MOST_THREADS = 8  # of one
 RETRY_SECONDS = 5.0  # until one that could not be drawn is tried again
 
@@ -146,6 +149,7 @@ class Stills:
                 camera,
                 marks=None if marked is None else marked.shown,
                 weight_maps=maps,
+                most=NEAREST if name.plan.scale == 1 else MOVING,
                 threads=min(os.cpu_count() or 1, MOST_THREADS),
                 stopping=stopping,
             )

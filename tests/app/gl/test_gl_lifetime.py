@@ -228,12 +228,12 @@ def test_atom_bits():
     assert carried == [[0, 63], [5, 129], []]
 
 
-@pytest.mark.parametrize("blends", [True, False])
-def test_layers_leave_nothing(gl, use_another_program, blends):
+@pytest.mark.parametrize("blends_all", [True, False])
+def test_layers_leave_nothing(gl, use_another_program, blends_all):
     """A walk past more than are kept, in two sizes, moving and at rest, with answers."""
     use_another_program()
     before = living(gl)
-    renderer = SplatRenderer(gl, hardware=replace(hardware_of(gl), blends=blends))
+    renderer = SplatRenderer(gl, hardware=replace(hardware_of(gl), blends_all=blends_all))
     scene = layered(12, count=40)
     renderer.set_scene(scene)
     for view in range(12):

@@ -7,23 +7,28 @@ import numpy as np
 import pytest
 import torch
 
+from app.gl.layered import LayeredLevel
 from app.gl.processor import still
 from app.window.drawing.card import CardPicture
 from app.window.drawing.processor import ProcessorPicture
 from app.window.drawing.stills import RETRY_SECONDS
 from app.window.governor import Governor, Kind, Plan
+from app.window.scene.commands import SceneArrived
 from app.window.scene.memory import SceneMemory
+from app.window.state import State
 from app.window.viewport import Viewport
 from langflash_core import pictures
-from langflash_core.geometry.poses import orbit
+from langflash_core.geometry.poses import from_view, orbit
 from langflash_core.language.relevance import compile_query
 from langflash_core.language.spaces import language_space
 from langflash_core.scene.edited import first_marks
-from langflash_core.scene.edits import delete
+from langflash_core.scene.edits import History, delete
 from langflash_core.scene.exposure import lit_camera
 from langflash_core.scene.mask import Mask
 from langflash_core.scene.thin import thin_with_rows
-from tests.app.window.scenes import PHRASES, room, shown_scene
+from langflash_core.splat.compose import NEAREST
+from tests.app.gl.test_gl_layers import layered
+from tests.app.window.scenes import PHRASES, after, room, shown_scene
 
 SIZE = (160, 120)
 
@@ -321,6 +326,48 @@ def test_a_scene_with_levels_moves_coarse_and_rests_whole(context, monkeypatch) 
         viewport.release()
     assert 0.25 in moved and moved <= {0.25, 1.0}
     assert rested == Plan(Kind.COLOUR), "all of them"
+
+
+def test_a_scene_of_layers_is_made_ready_a_layer_a_frame(context, monkeypatch) -> None:
+    """Buffers of one layer, or one shader, in each frame, also where the camera leaps to another photo; then
+    the picture that rests."""
+    scene, made = layered(12, count=60), []
+    real = LayeredLevel._made
+
+    def counted(level: LayeredLevel, view: int):
+        if len(level._scene.gaussians) > NEAREST:  # not what shaders are compiled with
+            made.append(view)
+        return real(level, view)
+
+    monkeypatch.setattr(LayeredLevel, "_made", counted)
+    shown = shown_scene()
+    assert shown.scene.info is not None
+    info = replace(shown.scene.info, scene=scene, history=History(first_marks(scene)))
+    state = after(State(), SceneArrived(info))
+    with context:
+        viewport = Viewport(context)
+        viewport.set_scene(1, scene)
+        programs = viewport._made().canvas.painter.programs._made
+        compiled = set()
+        for view in (2, 9):
+            own = scene.camera(view)
+            seen = own.viewmat.double().numpy(), own.K.double().numpy(), (own.width, own.height)
+            state = state.with_scene(pose=from_view(*seen, 1.0))
+            before = len(made)
+            for _ in range(300):
+                counts = len(made), len(programs)
+                state = replace(state, now=state.now + 0.05)
+                viewport.update(state, SIZE, touched=0.0)
+                assert len(made) <= counts[0] + 1
+                if len(programs) > counts[1] and viewport.drawn is None:
+                    compiled |= set(programs)
+                    assert len(programs) == counts[1] + 1
+                if viewport.whole and not viewport.settling:
+                    break
+                time.sleep(0.01)
+            assert viewport.whole and len(made) > before
+        assert "blend.frag" in str(compiled)
+        viewport.release()
 
 
 def test_of_a_huge_scene_only_a_share_is_brought_to_opengl_on_the_processor(context, monkeypatch) -> None:

@@ -12,8 +12,9 @@ from app.gl import SplatRenderer
 from app.gl.canvas import Canvas
 from app.gl.processor import still
 from app.gl.processor.still import StillMaps, draw_still
-from app.gl.warming import SIDE, warm_up
+from app.gl.warming import SIDE, warm_layers, warm_up
 from langflash_core.language.relevance import relevance_maps
+from langflash_core.records import Record
 from langflash_core.splat import render
 from tests.app.gl.questions import full_relevance, psnr, question
 from tests.splat.scenes import camera, cloud, maps_of, turned
@@ -178,10 +179,32 @@ def test_shaders_are_compiled_ahead(gl, scene) -> None:
     renderer.ask(question(made, 1))
     renderer.draw(SEEN, weight_maps=False, fast=True)
     renderer.heat_texture()
+    two = replace(made, viewmats=made.viewmats.expand(2, 4, 4), Ks=made.Ks.expand(2, 3, 3))
+    two = replace(two, view_ids=torch.arange(50) % 2, record=Record(layered=True))
+    renderer.set_scene(two)
+    renderer.draw(SEEN, weight_maps=False, moving=True)
+    renderer.draw(SEEN, weight_maps=False, fast=True)
+    renderer.heat_texture()
+    assert renderer.passes["blend"] >= 2
     assert set(programs) == before
     assert SIDE & (SIDE - 1)  # of textures with such sides Mesa compiles shaders of their own
     assert gl.error == "GL_NO_ERROR"
     renderer.release()
+
+
+def test_what_blends_layers_is_compiled_ahead_alone(gl) -> None:
+    """For a scene that comes before the rest: one program at a time; what is broken off leaves nothing."""
+    renderer = SplatRenderer(gl)
+    before, programs = buffers(), renderer.canvas.painter.programs._made
+    counts = [0]
+    for _ in warm_layers(renderer.canvas):
+        counts.append(len(programs))
+    assert max(np.diff([*counts, len(programs)])) == 1 and "blend.frag" in str(programs.keys())
+    begun = warm_layers(renderer.canvas)
+    next(begun)
+    del begun
+    renderer.release()
+    assert buffers() == before and gl.error == "GL_NO_ERROR"
 
 
 def test_weight_maps_of_one_size_are_kept(gl, scene) -> None:
