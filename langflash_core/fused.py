@@ -6,12 +6,15 @@ one surface from the start (`scene.ownership`): a Gaussian goes where its cell b
 seen through.
 """
 
+import numpy as np
 import torch
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Integer
+from scipy.spatial import KDTree
 from torch import Tensor
 
-from langflash_core.geometry.cameras import pictured
+from langflash_core.geometry.cameras import invert_rigid, pictured
 from langflash_core.scene.detailed import covering
+from langflash_core.splat.compose import DEPTH
 from langflash_core.splat.projection import drawable_rows, project, view_depths
 from langflash_core.splat.tiles import rasterize_tiles
 from langflash_core.types import Scene
@@ -42,6 +45,39 @@ def fused_rows(scene: Scene) -> Bool[Tensor, " N"]:
         line = y.nan_to_num(0).floor().long().clamp(0, height - 1)
         rows[own] = keep[view][line, column]
     return rows
+
+
+def told_in_layers(
+    scene: Scene,
+    surface: Bool[Tensor, " N"],
+    numbers: Integer[np.ndarray, " N"],
+    asked: Bool[np.ndarray, " N"],
+    unknown: int,
+) -> Integer[np.ndarray, " N"]:
+    """What is known of the Gaussians of one surface, told of those that show it in other layers: each has the
+    number of the nearest one of the surface, up to `compose.DEPTH` of its distance from its photo, within
+    which layers show the same.
+
+    Args:
+        surface: `fused_rows`. numbers: of the surface's Gaussians; the others' are not looked at.
+        asked: which are told, and which may tell.
+
+    Returns:
+        `numbers` of the surface that are asked; `unknown` of what is not asked, or not near.
+    """
+    assert scene.view_ids is not None
+    of_surface = surface.cpu().numpy()
+    means = scene.gaussians.means.detach().cpu().double()
+    finite = asked & torch.isfinite(means).all(1).numpy()
+    tell, ask = np.flatnonzero(finite & of_surface), np.flatnonzero(finite & ~of_surface)
+    found = np.where(asked & of_surface, numbers, unknown)
+    if len(tell) and len(ask):
+        eyes = invert_rigid(scene.viewmats.detach().cpu().double())[:, :3, 3]
+        away = (means[ask] - eyes[scene.view_ids.cpu()[ask]]).norm(dim=1).numpy()
+        far, nearest = KDTree(means[tell].numpy()).query(means[ask].numpy())
+        near = far <= DEPTH * away
+        found[ask[near]] = numbers[tell[nearest[near]]]
+    return found
 
 
 def _own_depths(scene: Scene) -> tuple[Float[Tensor, "V H W"], Float[Tensor, "V H W"]]:
