@@ -351,5 +351,7 @@ def test_what_a_merge_brought_is_saved_in_every_layer(tmp_path: Path):
     save(saved, tmp_path / "saved.langflash")
     again = load(tmp_path / "saved.langflash")
     assert again.layered and len(again.layer(0).gaussians) == len(first.layer(0).gaussians) + 20
+    with pytest.raises(ValueError, match="without layers"):
+        joined(second, first)
     plain = joined(first.with_record(layered=False), second)
     assert edited_scene(plain, first_marks(plain)).view_ids is None

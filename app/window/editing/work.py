@@ -245,9 +245,19 @@ class GrowSelection(Selection):
         means, radii = placed.means.numpy(), disc_radii(placed)
         visible = self.marks.visible.rows()
         allowed = visible & self.within.meant() if self.within else visible
-        distance = self.reach * spacing(means[visible])
+        distance = self.reach * spacing(means[visible & self._of_one_layer(visible)])
         found = grow(means, self.marks.selected.rows(), allowed, distance, radii)
         yield Found(Mask.of(found), "add", f"around, {self.within.text!r}" if self.within else "around")
+
+    def _of_one_layer(self, visible: np.ndarray) -> np.ndarray:
+        """(N,) bool: of a scene of layers those of the largest one, in which neighbours are as far apart as a
+        surface has them; else all."""
+        ids = self.scene.view_ids
+        if not self.scene.layered or ids is None:
+            return np.ones_like(visible)
+        numbers = ids.numpy()
+        counts = np.bincount(numbers[visible & (numbers >= 0)], minlength=1)
+        return numbers == counts.argmax() if counts.any() else np.ones_like(visible)
 
 
 @dataclass(frozen=True)
