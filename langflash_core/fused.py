@@ -74,9 +74,9 @@ def told_in_layers(
     if len(tell) and len(ask):
         eyes = invert_rigid(scene.viewmats.detach().cpu().double())[:, :3, 3]
         away = (means[ask] - eyes[scene.view_ids.cpu()[ask]]).norm(dim=1).numpy()
-        far, nearest = KDTree(means[tell].numpy()).query(means[ask].numpy())
+        far, which = KDTree(means[tell].numpy()).query(means[ask].numpy())
         near = far <= DEPTH * away
-        found[ask[near]] = numbers[tell[nearest[near]]]
+        found[ask[near]] = numbers[tell[np.asarray(which)[near]]]
     return found
 
 

@@ -238,11 +238,10 @@ def twice(apart: float = 1.08) -> tuple[Scene, torch.Tensor]:
     """The squares in two layers, of photos beside each other, the second's depths so many times as large."""
     scene, owner = chairs()
     g = scene.gaussians
-    both = Gaussians(torch.cat((g.means, apart * g.means)), *(torch.cat((v, v)) for v in (g.quats, g.scales)),
-                     torch.cat((g.opacities, g.opacities)), torch.cat((g.sh, g.sh)))  # fmt: skip
+    rows = torch.arange(len(g)).repeat(2)
+    both = replace(g.rows(rows), means=torch.cat((g.means, apart * g.means)))
     aside = torch.eye(4)
     aside[0, 3] = -0.1
-    rows = torch.arange(len(g)).repeat(2)
     layers = replace(
         scene,
         gaussians=both,
