@@ -12,7 +12,8 @@ from dataclasses import replace
 
 import numpy as np
 import torch
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Integer
+from scipy.spatial import KDTree
 from torch import Tensor
 
 from langflash_core.at_once import at_once
@@ -21,9 +22,9 @@ from langflash_core.geometry.harmonics import colour_to_sh, sh_to_colour
 from langflash_core.scene.consistency import outvoted, seen_through
 from langflash_core.scene.ownership import filled, owned
 from langflash_core.splat.colours import Solved, solved_colours
+from langflash_core.splat.compose import DEPTH
 from langflash_core.splat.mixing import mixing
-from langflash_core.splat.projection import drawable_rows, project, view_depths
-from langflash_core.splat.tiles import rasterize_tiles
+from langflash_core.splat.projection import project, view_depths
 from langflash_core.types import Camera, Scene
 
 _SHOWN = 0.5  # alpha from which a cell shows the layer
@@ -65,11 +66,19 @@ def _colours(scene: Scene, whole: Scene) -> Float[Tensor, "n 3"]:
 
 def _picture(layer: Scene, camera: Camera) -> Float[Tensor, "3 h w"]:
     """A layer from its photo's place; no number where it shows nothing."""
+    colours, alpha = _drawn(layer, camera, sh_to_colour(layer.gaussians.sh, layer.gaussians.means))
+    return torch.where(alpha >= _SHOWN, colours, torch.nan)
+
+
+def _drawn(
+    layer: Scene, camera: Camera, values: Float[Tensor, "n C"]
+) -> tuple[Float[Tensor, "C h w"], Float[Tensor, "h w"]]:
+    """Means of values of a layer's Gaussians in each pixel, and alpha."""
     matrix = mixing(project(layer.gaussians, camera), camera, len(layer.gaussians))
-    light = torch.from_numpy(np.asarray(matrix.sum(1)))
-    sums = torch.from_numpy(matrix @ sh_to_colour(layer.gaussians.sh, layer.gaussians.means).numpy())
-    flat = torch.where(light >= _SHOWN, sums / light.clamp_min(_SHOWN), torch.nan)
-    return flat.T.reshape(3, camera.height, camera.width)
+    light, sums = np.asarray(matrix.sum(1))[:, 0], matrix @ values.nan_to_num(0).float().numpy()
+    means = torch.from_numpy(sums / np.maximum(light, _SHOWN)[:, None]).T
+    size = (camera.height, camera.width)
+    return means.reshape(-1, *size), torch.from_numpy(light).reshape(size)
 
 
 @torch.no_grad()
@@ -90,17 +99,49 @@ def fused_rows(scene: Scene) -> Bool[Tensor, " N"]:
     return rows
 
 
+def told_in_layers(
+    scene: Scene,
+    surface: Bool[Tensor, " N"],
+    numbers: Integer[np.ndarray, " N"],
+    asked: Bool[np.ndarray, " N"],
+    unknown: int,
+) -> Integer[np.ndarray, " N"]:
+    """What is known of the Gaussians of one surface, told of those that show it in other layers: each has the
+    number of the nearest one of the surface, up to `compose.DEPTH` of its distance from its photo, within
+    which layers show the same.
+
+    Args:
+        surface: `fused_rows`. numbers: of the surface's Gaussians; the others' are not looked at.
+        asked: which are told, and which may tell.
+
+    Returns:
+        `numbers` of the surface that are asked; `unknown` of what is not asked, or not near.
+    """
+    assert scene.view_ids is not None
+    of_surface = surface.cpu().numpy()
+    means = scene.gaussians.means.detach().cpu().double()
+    finite = asked & torch.isfinite(means).all(1).numpy()
+    tell, ask = np.flatnonzero(finite & of_surface), np.flatnonzero(finite & ~of_surface)
+    found = np.where(asked & of_surface, numbers, unknown)
+    if len(tell) and len(ask):
+        eyes = invert_rigid(scene.viewmats.detach().cpu().double())[:, :3, 3]
+        away = (means[ask] - eyes[scene.view_ids.cpu()[ask]]).norm(dim=1).numpy()
+        far, which = KDTree(means[tell].numpy()).query(means[ask].numpy())
+        near = far <= DEPTH * away
+        found[ask[near]] = numbers[tell[np.asarray(which)[near]]]
+    return found
+
+
 def _own_depths(scene: Scene) -> tuple[Float[Tensor, "V H W"], Float[Tensor, "V H W"]]:
     """Depth and alpha of each layer from its own photo's place; where it shows nothing, 1 and 0."""
-    depths, alphas = [], []
-    for view in range(scene.num_views):
+
+    def seen(view: int) -> tuple[Tensor, Tensor]:
         layer, camera = scene.layer(view), scene.camera(view)
-        layer = layer.rows(drawable_rows(layer))
-        feature = view_depths(layer.gaussians, camera).float()[:, None]
-        (sums,), alpha = rasterize_tiles(project(layer.gaussians, camera), [feature], camera)
+        (depth,), alpha = _drawn(layer, camera, view_depths(layer.gaussians, camera)[:, None])
         there = alpha >= _SHOWN
-        depths.append(torch.where(there, sums[..., 0] / alpha.clamp_min(_SHOWN), 1.0))
-        alphas.append(torch.where(there, alpha, 0.0))
+        return torch.where(there, depth, 1.0), torch.where(there, alpha, 0.0)
+
+    depths, alphas = zip(*at_once(seen, range(scene.num_views)), strict=True)
     return torch.stack(depths), torch.stack(alphas)
 
 

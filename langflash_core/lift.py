@@ -33,6 +33,7 @@ from langflash_core.scene.assemble import sparse_weights
 from langflash_core.scene.bare import framing_camera
 from langflash_core.splat import render as render_reference
 from langflash_core.splat.backprojection import gathered
+from langflash_core.splat.compose import Nearness, shares
 from langflash_core.types import Camera, Frame, Gaussians, Scene, Semantics, Views
 
 PRESET = "mini"
@@ -72,7 +73,7 @@ def lift(
     """A plain scene with groups, a dictionary, and the views that they were seen in.
 
     Args:
-        scene: any; what language it has is replaced.
+        scene: any; what language it has is replaced. One of layers keeps its photos, which tell them apart.
         photos, viewmats: V views and their poses (V, 4, 4) in the scene's world; None: views of the
             scene itself, around its middle.
         up: the axis of the scene's world that points up, one of `UPS`; for views of itself.
@@ -107,7 +108,7 @@ def lift(
     maps, dictionary = posed_semantics(network, views, relative, depths / unit)
     if not len(dictionary):
         raise InputError("the network finds no part in these views; give photos that show more of the scene")
-    sums, totals = _carried_back(scene, cameras, maps, frames, progress, cancelled)
+    sums, totals = _carried_back(scene, cameras, maps, frames, draw, progress, cancelled)
     progress("done", 1.0)
     lifted = _spoken(scene, views, cameras, sums, totals, dictionary, network.calibration)
     if photos is None:
@@ -286,6 +287,7 @@ def _carried_back(
     cameras: Sequence[Camera],
     maps: Tensor,
     frames: Sequence[Frame],
+    draw: Renderer,
     progress: Progress,
     cancelled,
 ) -> tuple[Tensor, Tensor]:
@@ -296,10 +298,26 @@ def _carried_back(
         _check(cancelled)
         progress("carrying back", 0.6 + 0.4 * index / len(cameras))
         trust = (frame.alphas >= _COVERED).float()
-        own, count = gathered(scene.gaussians, camera, values.permute(1, 2, 0), trust)
-        sums += own
-        totals += count
+        for rows, counts in _pictured(scene, camera, draw):
+            some = scene.gaussians.rows(rows)
+            own, count = gathered(some, camera, values.permute(1, 2, 0), trust * counts)
+            sums[rows] += own
+            totals[rows] += count
     return sums, totals
+
+
+def _pictured(scene: Scene, camera: Camera, draw: Renderer) -> list[tuple[Tensor, Tensor]]:
+    """Rows (n,) of what makes up a picture, and what it counts in each pixel (H, W): all of the scene, or
+    each of the layers that are blended."""
+    chosen = Nearness.of(scene).chosen(camera) if scene.layered else None
+    if chosen is None or not chosen.views or scene.view_ids is None:
+        return [(torch.arange(len(scene.gaussians)), torch.ones(camera.height, camera.width))]
+    frames = [draw(scene.layer(view), camera) for view in chosen.views]
+    alphas, depths = (
+        torch.stack([getattr(f, name).float() for f in frames]) for name in ("alphas", "depths")
+    )
+    rows = [((scene.view_ids == view) | (scene.view_ids < 0)).nonzero()[:, 0] for view in chosen.views]
+    return list(zip(rows, shares(alphas.cpu(), depths.cpu(), chosen.weights), strict=True))
 
 
 def _spoken(
@@ -318,19 +336,18 @@ def _spoken(
         nearest = rows[torch.from_numpy(np.asarray(KDTree(means[seen]).query(means[~seen])[1]))]
         ids[hidden], values[hidden] = ids[nearest], values[nearest]
     # What is known of atoms and of photos that are no more.
-    plain = scene.with_record(atom_names={}, atom_denials={}, silent_atoms=(), lone_atoms=(), light={})
+    plain = scene.with_record(atom_names={}, atom_denials={}, silent_atoms=(), lone_atoms=())
+    told = {"preset": PRESET, "calibration": dict(calibration)}
+    counts = {**scene.record.counts, "seen": int(seen.sum())}
+    spoken = replace(plain, semantics=Semantics(ids, values, dictionary, PRESETS[PRESET].space))
+    if scene.layered:
+        return spoken.with_record(**told, counts=counts)
     lifted = replace(
-        plain,
-        semantics=Semantics(ids, values, dictionary, PRESETS[PRESET].space),
+        spoken,
         viewmats=torch.stack([camera.viewmat.float() for camera in cameras]),
         Ks=views.Ks.float(),
         view_size=views.size,
         photos=views.sources,
         view_ids=None,
     )
-    return lifted.with_record(
-        preset=PRESET,
-        photos=tuple(views.names),
-        calibration=dict(calibration),
-        counts={**scene.record.counts, "seen": int(seen.sum())},
-    )
+    return lifted.with_record(**told, counts=counts, photos=tuple(views.names), light={})

@@ -28,7 +28,7 @@ from langflash_core.language.answers import (
 from langflash_core.language.gaussians import gaussian_relevance
 from langflash_core.language.relevance import compile_query
 from langflash_core.language.spaces import language_space
-from langflash_core.scene.instances import disc_radii, instances
+from langflash_core.scene.instances import disc_radii, things
 from langflash_core.scene.thin import covered_areas
 from langflash_core.splat.visibility import seen_shares
 from langflash_core.types import Camera, Frame, Record, Scene, SegmentedView, Segments, Semantics
@@ -68,15 +68,19 @@ def photo_shares(scene: Scene) -> Tensor:
     """(V, N) of the photos that each Gaussian makes up; of the scene's surface, (1 or V, N), what no photo is
     known of."""
     areas = torch.from_numpy(covered_areas(scene.gaussians)).float()
-    areas = (areas / areas.sum().clamp_min(1e-30))[None]
     if scene.view_ids is None:
-        return areas
-    return torch.where(scene.view_ids.cpu() < 0, areas, seen_shares(scene))
+        return (areas / areas.sum().clamp_min(1e-30))[None]
+    unknown = scene.view_ids.cpu() < 0
+    # A surface is there once in each of the layers that show it.
+    total = areas[unknown].sum() + areas[~unknown].sum() / (scene.num_views if scene.layered else 1)
+    areas, seen = (areas / total.clamp_min(1e-30))[None], seen_shares(scene)
+    # What fills a hole of all layers is seen in photos, as what a merge put beside them is not.
+    return torch.where(unknown, torch.maximum(areas, seen) if scene.layered else areas, seen)
 
 
 def connected_things(scene: Scene, members: Tensor, shares: Tensor) -> Tensor:
-    """(N,) numbers of `instances`, without those that no photo shows well enough; 0 where that is all."""
-    numbers = torch.from_numpy(instances(scene.gaussians, members.numpy()))
+    """(N,) numbers of `things`, without those that no photo shows well enough; 0 where that is all."""
+    numbers = torch.from_numpy(things(scene, members.numpy()))
     if not numbers.any() or float(shares[:, members].sum(1).max()) < MIN_AREA:
         return torch.zeros_like(numbers)
     shown = shares.new_zeros(len(shares), int(numbers.max()) + 1).index_add_(1, numbers, shares).amax(0)
@@ -150,7 +154,8 @@ def carrying(scene: Scene, segments: Segments) -> Scene:
     )
     values = torch.cat((segments.members.T, union[:, None], numbers > 0), 1).float()
     atoms = torch.ones(count + 1 + len(segments.things), 1)
-    plain = replace(scene, record=Record())  # names and silences are of the scene's own atoms
+    # names and silences are of the scene's own atoms
+    plain = replace(scene, record=Record(layered=scene.record.layered))
     return replace(plain, semantics=Semantics(ids, values, atoms, scene.semantics.space))
 
 

@@ -72,6 +72,17 @@ def box_room(
     )  # fmt: skip
 
 
+def in_layers(scene: Scene, apart: float = 1.05) -> Scene:
+    """The scene as two layers, of its photos, the second's depths so many times as large."""
+    count, second = len(scene.gaussians), scene.viewmats[1][:3, 3]
+    twice = scene.rows(torch.arange(count).repeat(2))
+    means = twice.gaussians.means.clone()
+    means[count:] = apart * (means[count:] + second) - second
+    ids = torch.arange(2).repeat_interleave(count)
+    layered = replace(twice, gaussians=replace(twice.gaussians, means=means), view_ids=ids)
+    return layered.with_record(layered=True)
+
+
 def true_up(scene: Scene, pitch: float = 20.0, roll: float = 4.0, yaw: float = 10.0) -> np.ndarray:
     """Up in the scene's axes."""
     turn = Rotation.from_euler("zxy", [roll, pitch, -yaw], degrees=True).as_matrix()

@@ -195,3 +195,19 @@ def test_photos_that_do_not_look_like_the_scene_are_said(known_network):
     (said,) = lift(plain, wrong, viewmats).record.warnings
     assert "do not look like the scene" in said and "; " in said
     assert not lift(plain).record.warnings  # views of itself
+
+
+def test_layers_stay_layers_and_each_gets_its_stripes_back(known_network):
+    count = len(known_network.gaussians)
+    twice = known_network.rows(torch.arange(count).repeat(2))
+    ids = torch.arange(2).repeat_interleave(count)
+    bare = replace(bare_scene(twice.gaussians, "walls.ply"), viewmats=twice.viewmats, Ks=twice.Ks)
+    layers = replace(bare, view_size=twice.view_size, view_ids=ids).with_record(layered=True)
+    lifted = lift(layers)
+    check_scene(lifted)
+    assert lifted.layered and torch.equal(lifted.viewmats, layers.viewmats)
+    assert lifted.view_ids is not None and torch.equal(lifted.view_ids, ids)
+    truth = twice.semantics.dense_weights().argmax(-1)
+    right = lifted.semantics.dense_weights().argmax(-1) == truth
+    for view in range(2):
+        assert float(right[ids == view].float().mean()) > 0.97  # at the borders a pixel shows two stripes

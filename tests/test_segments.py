@@ -11,8 +11,9 @@ from langflash_core import segments
 from langflash_core.errors import PromptError
 from langflash_core.geometry.harmonics import SH_C0
 from langflash_core.language.spaces import language_space
+from langflash_core.scene.instances import instances
 from langflash_core.splat import render
-from langflash_core.types import Camera, Gaussians, Scene, Segments, Semantics
+from langflash_core.types import Camera, Gaussians, Record, Scene, Segments, Semantics
 from tests.app.cli.conftest import HEIGHT, WIDTH, stripes
 
 COLOURS = torch.tensor([[0.9, 0.1, 0.1], [0.1, 0.9, 0.1], [0.1, 0.1, 0.9]])
@@ -231,3 +232,55 @@ def test_boxes_hold_the_surface_however_its_elements_are_spread():
     (box,) = segments.boxes(scene, segments.segment(scene, ["table"]))
     assert box["size"][:2] == pytest.approx([0.9, 0.9], abs=0.01)  # from the middles of the outer ones
     assert box["center"][:2] == pytest.approx([0, 0], abs=0.01)
+
+
+def twice(apart: float = 1.08) -> tuple[Scene, torch.Tensor]:
+    """The squares in two layers, of photos beside each other, the second's depths so many times as large."""
+    scene, owner = chairs()
+    g = scene.gaussians
+    rows = torch.arange(len(g)).repeat(2)
+    both = replace(g.rows(rows), means=torch.cat((g.means, apart * g.means)))
+    aside = torch.eye(4)
+    aside[0, 3] = -0.1
+    layers = replace(
+        scene,
+        gaussians=both,
+        semantics=scene.semantics.rows(rows),
+        viewmats=torch.stack((torch.eye(4), aside)),
+        Ks=scene.Ks.repeat(2, 1, 1),
+        view_ids=torch.arange(2).repeat_interleave(len(g)),
+        record=Record(layered=True),
+    )
+    return layers, owner.repeat(2)
+
+
+def test_a_thing_in_two_layers_is_counted_once_and_has_the_gaussians_of_both():
+    scene, owner = twice()
+    assert len(np.unique(instances(scene.gaussians, (owner < 2).numpy()))) == 5  # by touch alone each twice
+    numbers = segments.connected_things(scene, owner < 2, segments.photo_shares(scene))
+    told = [numbers[owner == square].unique().tolist() for square in range(3)]
+    assert sorted(told[:2]) == [[1], [2]] and told[2] == [0]
+
+
+def test_what_one_layer_alone_shows_and_what_stands_far_behind_are_things_of_their_own():
+    scene, owner = twice(1.3)  # 26 % of depth: no longer the same
+    numbers = segments.connected_things(scene, owner == 0, segments.photo_shares(scene))
+    assert sorted(numbers.unique().tolist()) == [0, 1, 2]
+    assert scene.view_ids is not None
+    scene, owner = scene.rows(scene.view_ids == 0), owner[scene.view_ids == 0]
+    numbers = segments.connected_things(scene, owner < 2, segments.photo_shares(scene))
+    assert sorted(numbers.unique().tolist()) == [0, 1, 2]
+
+
+def test_mattes_of_layers_are_blended_as_pictures_are():
+    scene, owner = twice()
+    parts = parts_of(scene, owner)
+    carrying = segments.carrying(scene, parts)
+    for view in range(2):
+        seen = segments.segmented_view(carrying, parts, scene.camera(view), render)
+        for phrase, members in enumerate(parts.members):
+            ids = torch.zeros(len(members), 1).long()
+            twin = replace(scene, semantics=Semantics(ids, members[:, None].float(), torch.ones(1, 1), "t"))
+            maps = render(twin, scene.camera(view)).weight_maps
+            assert maps is not None
+            torch.testing.assert_close(seen.mattes[phrase], maps[..., 0])

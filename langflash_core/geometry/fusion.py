@@ -86,7 +86,11 @@ def fuse(
     if not (field[seen] > 0).any() or not (field[seen] < 0).any():
         return None
     places, faces, _, _ = marching_cubes(field, 0.0, gradient_direction="descent", allow_degenerate=False)
-    faces = faces[_known(seen)[tuple(places[faces].mean(1).astype(int).T)]]
+    known = _known(seen)
+    cells = np.minimum(
+        places[faces].mean(1).astype(int), np.array(known.shape) - 1
+    )  # the last plane has none
+    faces = faces[known[tuple(cells.T)]]
     if not len(faces):
         return None
     used, faces = np.unique(faces, return_inverse=True)

@@ -18,8 +18,10 @@ from functools import cached_property
 import numpy as np
 import torch
 from jaxtyping import Bool, Float, Integer
+from torch import Tensor
 
 from langflash_core.errors import InputError
+from langflash_core.fused import fused_rows, told_in_layers
 from langflash_core.inventory.pieces import STRUCTURE, Parts, parts_of_room
 from langflash_core.language.answers import BOX_QUANTILES
 from langflash_core.language.gaussians import gaussian_relevance
@@ -83,10 +85,14 @@ class Thing:
 
 @dataclass(frozen=True)
 class Inventory:
-    """The things of a room. scale: units of `unit` per scene unit. guess: where the scale is one. shares: of
-    the photos that each Gaussian makes up. parts: of the room; those that answer well are its things."""
+    """The things of a room. scene: one surface of `given`, the scene that was asked for (`fused`).
+    surface (M,): which Gaussians of that these are; None: all. scale: units of `unit` per scene unit. guess:
+    where the scale is one. shares: of the photos that each Gaussian makes up. parts: of the room; those that
+    answer well are its things."""
 
     scene: Scene = field(repr=False)
+    given: Scene = field(repr=False)
+    surface: Tensor | None = field(repr=False)
     world: World
     unit: str
     scale: float
@@ -112,9 +118,21 @@ class Inventory:
         """One in `unit`; of a scene without a scale, by how far its surface spreads in rooms."""
         return 1.0 if self.unit == "m" else float(self.stands[:, [0, 2]].std() / 1.2)
 
+    @cached_property
+    def numbers(self) -> Integer[np.ndarray, " M"]:
+        """Place in `things` of what each Gaussian of `given` is of, in all of its layers; -1 of none."""
+        told = np.full(len(self.scene.gaussians), -1)
+        for number, thing in enumerate(self.things):
+            told[thing.rows] = number
+        if self.surface is None:
+            return told
+        numbers = np.full(len(self.surface), -1)
+        numbers[self.surface.numpy()] = told
+        return told_in_layers(self.given, self.surface, numbers, np.ones(len(numbers), bool), -1)
+
     def segments(self) -> Segments:
-        """Its things as phrases of one part each, for `langflash_core.segments`."""
-        members = torch.from_numpy(np.stack([thing.rows for thing in self.things]))
+        """Its things as phrases of one part each of `given`, for `langflash_core.segments`."""
+        members = torch.from_numpy(np.arange(len(self.things))[:, None] == self.numbers)
         sure = tuple(thing.sure for thing in self.things)
         return Segments(tuple(thing.id for thing in self.things), sure, 0.0, members, members.long())
 
@@ -132,14 +150,16 @@ def inventory(scene: Scene, *, threshold: float | None = None, least: float = LE
     """
     if not len(scene.gaussians):
         raise InputError("this scene is empty; make it again, or undo what deleted it")
+    surface = fused_rows(scene).cpu() if scene.layered else None
+    given, scene = scene, scene if surface is None else scene.rows(surface).with_record(layered=False)
     world = scene.record.world or found_world(scene)
-    scene = scene.with_record(world=world)
+    given, scene = given.with_record(world=world), scene.with_record(world=world)
     metres, guess = metres_of(scene)
     scale = metres or (guess.metres if guess else 1.0)
     unit = "m" if metres or guess else "units"
     shares = photo_shares(scene).numpy()
     parts = parts_of_room(scene, shares.sum(0, dtype=float))
-    whole = Inventory(scene, world, unit, scale, guess, shares, parts)
+    whole = Inventory(scene, given, surface, world, unit, scale, guess, shares, parts)
     return replace(whole, things=_things(whole, threshold, least))
 
 

@@ -30,8 +30,7 @@ from langflash_core.scene.changes import UNTURNED, Moved, Spot, Turn, turn_about
 from langflash_core.scene.mask import Mask
 from langflash_core.scene.selection import spacing
 from langflash_core.splat import drawable_rows, project
-from langflash_core.splat.contributions import contributions
-from langflash_core.splat.picking import SEEN
+from langflash_core.splat.picking import seen_in
 from langflash_core.types import Camera, Gaussians, Scene
 
 from .looks import Render
@@ -115,7 +114,8 @@ def clone(
     seen = _seen(shown, stroke, render)
     surface = _surface(seen, stroke)
     near, move = _moved(seen.points, np.array(source), surface, stroke.radius, fit)
-    part = shown.rows(torch.from_numpy(near))
+    part = _of_all_layers(shown.rows(torch.from_numpy(near)))
+    move = replace(move, rows=Mask.full(len(part.gaussians)))
     laid = _lifted(changed(part.gaussians, (move,)), surface)
     here = torch.from_numpy(stroke.holds(_centres(laid, stroke.camera), _RIM))
     if not here.any():
@@ -128,16 +128,29 @@ def clone(
     return copies, gone
 
 
+def _of_all_layers(part: Scene) -> Scene:
+    """What lies near the source, as the layer has it that has most there, for every layer; as it is where
+    there are none."""
+    if not part.layered or part.view_ids is None or not bool((part.view_ids >= 0).any()):
+        return part
+    ids = part.view_ids
+    most = int(ids[ids >= 0].bincount().argmax())
+    part = part.rows((ids == most) | (ids < 0))
+    return replace(part, view_ids=torch.full((len(part.gaussians),), -1))
+
+
 @dataclass(frozen=True)
 class _Seen:
     """Of all N that take part: places, places in the picture (NaN: in none), depths, whether one sees them.
-    here (N,): those that are seen in the pixels, or around them where most of them show nothing."""
+    here (N,): those that are seen in the pixels, or around them where most of them show nothing. layered:
+    seen in a layer, whose surface may lie a little before or behind another's."""
 
     points: Float[np.ndarray, "N 3"]
     centres: Float[np.ndarray, "N 2"]
     depths: Float[np.ndarray, " N"]
     seen: Bool[np.ndarray, " N"]
     here: Bool[np.ndarray, " N"]
+    layered: bool
 
 
 def _seen(shown: Scene, stroke: Stroke, render: Render) -> _Seen:
@@ -147,11 +160,11 @@ def _seen(shown: Scene, stroke: Stroke, render: Render) -> _Seen:
     alphas = render(shown, camera, weight_maps=False).alphas.cpu().numpy()[stroke.pixels]
     closed = bool(alphas.size) and float((alphas >= _HALF).mean()) >= _HALF
     for around in (0.0, 2 * stroke.radius):
-        seen = (contributions(gaussians, camera, torch.from_numpy(stroke.grown(around))) >= SEEN).numpy()
+        seen = seen_in(shown, np.ones(len(points), bool), camera, stroke.grown(around))
         here = seen & stroke.holds(centres, around)
         if closed and here.sum() >= _NEAREST:
             break
-    return _Seen(points, centres, depths, seen, here)
+    return _Seen(points, centres, depths, seen, here, shown.layered)
 
 
 def _centres(gaussians: Gaussians, camera: Camera) -> Float[np.ndarray, "n 2"]:
@@ -204,11 +217,11 @@ def _surface(seen: _Seen, stroke: Stroke) -> _Surface:
 
 
 def _covered(seen: _Seen, surface: _Surface, stroke: Stroke) -> Bool[np.ndarray, " N"]:
-    """What lies on the surface in the pixels, and what is seen there before it."""
+    """What lies on the surface in the pixels, and what is seen there before it; of layers, all of that."""
     inside, found = stroke.holds(seen.centres), np.zeros(len(seen.points), bool)
     points, slack = seen.points[inside], 2 * _FAR * seen.depths[inside]
     over = surface.plane.apart(points) - surface.height(points)
-    found[inside] = (abs(over) <= slack) | (seen.seen[inside] & (over > 0))
+    found[inside] = (abs(over) <= slack) | (seen.seen[inside] & ((over > 0) | seen.layered))
     return found
 
 

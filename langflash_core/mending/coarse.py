@@ -76,7 +76,7 @@ def coarsened(part: Scene, side: float, *, squares: bool) -> Scene:
         part,
         gaussians=gaussians,
         semantics=_semantics(part, areas, cube, len(cells), of),
-        view_ids=None if views is None else _a_view(views, cube, len(cells))[of],
+        view_ids=None if views is None else _a_view(part, cube, len(cells))[of],
         levels=None if part.levels is None else torch.zeros(len(of), dtype=torch.uint8),
         confidences=None if sure is None else quantised(mean(sure[:, None])[of, 0]).float(),
     )
@@ -169,7 +169,10 @@ def _semantics(part: Scene, areas: Tensor, cube: np.ndarray, num_blocks: int, of
     return replace(semantics, weight_ids=ids[of], weight_values=values[of])
 
 
-def _a_view(view_ids: Tensor, cube: np.ndarray, count: int) -> Tensor:
-    """(B,) a view that made a member of each block."""
+def _a_view(part: Scene, cube: np.ndarray, count: int) -> Tensor:
+    """(B,) a view that made a member of each block; of layers none, so that all of them have it."""
     views = torch.full((count,), -1, dtype=torch.int64)
-    return views.scatter_reduce(0, torch.from_numpy(cube), view_ids.cpu(), "amax")
+    if part.layered:
+        return views
+    assert part.view_ids is not None
+    return views.scatter_reduce(0, torch.from_numpy(cube), part.view_ids.cpu(), "amax")

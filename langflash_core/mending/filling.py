@@ -340,7 +340,8 @@ def _elements(
     weights: Float[np.ndarray, "n K"] | None,
     view: int,
 ) -> Scene:
-    """Flat Gaussians with weights over the atoms of `none`, an empty scene of them."""
+    """Flat Gaussians with weights over the atoms of `none`, an empty scene of them. They are made by a view;
+    in a scene of layers by none, so that every layer has them."""
     count, semantics = len(means), none.semantics
     thin = _THIN * sizes.min(1, keepdims=True)
     gaussians = Gaussians(
@@ -358,7 +359,7 @@ def _elements(
         none,
         gaussians=gaussians,
         semantics=replace(semantics, weight_ids=ids, weight_values=values),
-        view_ids=None if none.view_ids is None else torch.full((count,), view),
+        view_ids=None if none.view_ids is None else torch.full((count,), -1 if none.layered else view),
         levels=None if none.levels is None else torch.zeros(count, dtype=torch.uint8),
         confidences=None if none.confidences is None else torch.zeros(count),
     )

@@ -8,6 +8,7 @@ b_i = 1 where Gaussian i is of the part: the share of the pixel's light that com
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 
+import numpy as np
 import torch
 from torch import Tensor
 
@@ -15,6 +16,7 @@ from langflash_core.geometry.harmonics import colour_to_sh
 from langflash_core.scene.exposure import lit_camera
 from langflash_core.scene.gaps import filled
 from langflash_core.splat import drawable_rows, project, view_colours, view_depths
+from langflash_core.splat.compose import blended, layers_of
 from langflash_core.splat.tiles import rasterize_tiles
 from langflash_core.types import Camera, Frame, Record, Scene, Semantics
 
@@ -27,6 +29,14 @@ Progress = Callable[[str, float], None]
 
 def drawn(scene: Scene, camera: Camera, *, weight_maps: bool = True) -> Frame:
     """A frame by the rasteriser for processors, for those who have no other at hand. Twin: `splat.render`."""
+    parts, weights = layers_of(scene, camera) if scene.layered else ([], np.ones(0))
+    if not parts:
+        return _drawn(scene, camera, weight_maps)
+    return blended([_drawn(part, camera, weight_maps) for part in parts], weights)
+
+
+def _drawn(scene: Scene, camera: Camera, weight_maps: bool) -> Frame:
+    """`drawn` of a scene of one layer."""
     rows = drawable_rows(scene)
     gaussians = scene.gaussians.map(lambda values: values.double()[rows])
     layers = torch.cat((view_colours(gaussians, camera), view_depths(gaussians, camera)[:, None]), 1)
@@ -49,7 +59,7 @@ def mattes(
     """
     ids = torch.zeros(len(part), 1, dtype=torch.int64)
     one = Semantics(ids, part.cpu().float()[:, None], torch.ones(1, 1), scene.semantics.space)
-    carrying = replace(scene, semantics=one, record=Record())
+    carrying = replace(scene, semantics=one, record=Record(layered=scene.record.layered))
     found = []
     for camera in cameras:
         frame = render(carrying, camera)

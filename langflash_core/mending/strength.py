@@ -57,15 +57,34 @@ def kind_strengths(
     scene: Scene, visible: Bool[np.ndarray, " N"], kinds: Sequence[str] = KINDS
 ) -> dict[str, Float[np.ndarray, " N"]]:
     """As `least_strengths`, kind by kind; what one kind finds at any strength takes no part in the next
-    one's."""
+    one's. Each layer of a scene that has some is looked at by itself, as a photo's own scene."""
     unknown = [kind for kind in kinds if kind not in KINDS]
     if unknown:
         raise InputError(f"there is no kind '{unknown[0]}' to clean up; choose {', '.join(KINDS)}")
+    views = torch.zeros(0) if scene.view_ids is None else scene.view_ids.unique()
+    if scene.layered and bool((views >= 0).any()):
+        return _of_layers(scene, visible, kinds, [int(view) for view in views if view >= 0])
     found, left = {}, visible.copy()
     for kind in (kind for kind in KINDS if kind in kinds and visible.sum() >= _FEWEST):
         least = _least(_SCORES[kind](scene, left), *LIMITS[kind])
         found[kind] = np.where(left, least, NEVER).astype(np.float32)
         left &= found[kind] == NEVER  # sheets would connect crumbs with what they are no part of
+    return found
+
+
+def _of_layers(
+    scene: Scene, visible: Bool[np.ndarray, " N"], kinds: Sequence[str], views: Sequence[int]
+) -> dict[str, Float[np.ndarray, " N"]]:
+    """`kind_strengths` of a scene of layers. What no photo made goes where it is rubbish in all of them."""
+    assert scene.view_ids is not None
+    ids = scene.view_ids.cpu().numpy()
+    found = {kind: np.where(ids < 0, 0.0, NEVER).astype(np.float32) for kind in KINDS if kind in kinds}
+    for view in views:
+        rows = np.flatnonzero((ids == view) | (ids < 0))
+        told = kind_strengths(scene.layer(view), visible[rows], kinds)
+        for kind, least in found.items():
+            own = told.get(kind, np.full(len(rows), NEVER, np.float32))
+            least[rows] = np.where(ids[rows] < 0, np.maximum(least[rows], own), own)
     return found
 
 

@@ -56,7 +56,8 @@ def edited_scene(scene: Scene, marks: Marks) -> Scene:
     Hidden Gaussians are kept. Untouched marks give back the scene itself.
     """
     scene = there(changed_scene(scene, marks), marks)
-    if scene.view_ids is not None and bool((scene.view_ids < 0).any()):
+    some_unknown = scene.view_ids is not None and bool((scene.view_ids < 0).any())
+    if some_unknown and not scene.layered:  # layers are told by them
         scene = replace(scene, view_ids=None)
     marks = marks.of_size(len(scene.gaussians), marks.atoms[: marks.there[1]])
     record = scene.record

@@ -1,17 +1,25 @@
-"""Connected things among Gaussians: which belong together because they touch, in 3D and so in every view."""
+"""Connected things among Gaussians: which belong together because they touch, in 3D and so in every view; in
+a scene of layers, too, because a photo shows both at one place."""
 
 import numpy as np
+import torch
 from jaxtyping import Bool, Float, Integer
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import KDTree
 
-from langflash_core.types import Gaussians
+from langflash_core.geometry.cameras import pictured
+from langflash_core.types import Gaussians, Scene
 
 LINK = 4.0
 """Mean radii within which two Gaussians touch. On scenes of photos the parts are the same from 3 to 8; below,
 surfaces fall apart, since neighbours of a pixel's size are 1.5 radii apart."""
 SMALLEST = 0.02  # of the largest thing's surface: less is a crumb
+SAME = 0.1
+"""Of the logarithm of depth, within which two layers show the same: as `DEPTH` of `splat.compose`."""
+_SHOWN = 0.25
+"""Of the smaller of two parts, that a photo shows at the other's place: much of a thing may be hidden there,
+and what stands beside it meets it with its edge."""
 _NEIGHBOURS = 16  # asked of each: more than a surface needs to stay in one piece
 
 
@@ -31,16 +39,76 @@ def instances(
     Returns:
         From 1, the largest surface (sum of r^2) first; 0 for others, and for crumbs below `SMALLEST` of it.
     """
-    parts, radii = connected(gaussians, members, link)
+    return _numbered(*connected(gaussians, members, link))
+
+
+def things(scene: Scene, members: Bool[np.ndarray, " N"]) -> Integer[np.ndarray, " N"]:
+    """`instances` of a scene; of a scene of layers, a thing that several of them show is one, although their
+    depths may lie farther apart than what touches.
+
+    Parts a and b are one where the photo of b's layer shows, at the pixels of b and within `SAME` of their
+    depth, at least `_SHOWN` of the smaller one's surface of a.
+    """
+    parts, radii = connected(scene.gaussians, members)
+    if scene.layered and parts.max(initial=-1) > 0:
+        parts = _as_one(scene, parts, radii)
+    return _numbered(parts, radii)
+
+
+def _numbered(parts: Integer[np.ndarray, " N"], radii: Float[np.ndarray, " N"]) -> Integer[np.ndarray, " N"]:
+    """Numbers of `instances`, of parts from 0, -1 of none."""
     some = parts >= 0
     if not some.any():
-        return np.zeros(len(members), np.int64)
+        return np.zeros(len(parts), np.int64)
     surfaces = np.bincount(parts[some], radii[some] ** 2)
     order = np.argsort(-surfaces, kind="stable")
     kept = order[surfaces[order] >= SMALLEST * surfaces.max()]
     names = np.zeros(len(surfaces) + 1, np.int64)  # the last for those that take no part
     names[kept] = np.arange(1, len(kept) + 1)
     return names[parts]
+
+
+def _as_one(
+    scene: Scene, parts: Integer[np.ndarray, " N"], radii: Float[np.ndarray, " N"]
+) -> Integer[np.ndarray, " N"]:
+    """Parts, those that are one thing in several layers with one number."""
+    assert scene.view_ids is not None
+    rows = np.flatnonzero(parts >= 0)
+    own, areas, views = parts[rows], radii[rows] ** 2, scene.view_ids.cpu().numpy()[rows]
+    means = scene.gaussians.means.detach().cpu()[torch.from_numpy(rows)].double().T
+    count = int(own.max()) + 1
+    surfaces, graph = np.bincount(own, areas, count), coo_matrix((count, count), dtype=bool)
+    for view in np.unique(views[views >= 0]).tolist():
+        there = _shown_at(scene, view, means, own, views == view)
+        met = (there >= 0) & (there != own)
+        pairs, which = np.unique(own[met] * np.int64(count) + there[met], return_inverse=True)
+        ends = np.divmod(pairs, count)
+        least = _SHOWN * np.minimum(surfaces[ends[0]], surfaces[ends[1]])
+        enough = np.bincount(which, areas[met], len(pairs)) >= least
+        graph += coo_matrix((enough, ends), (count, count))
+    return np.append(connected_components(graph, directed=False)[1], -1)[parts]
+
+
+def _shown_at(
+    scene: Scene,
+    view: int,
+    means: Float[torch.Tensor, "3 n"],
+    parts: Integer[np.ndarray, " n"],
+    of_view: Bool[np.ndarray, " n"],
+) -> Integer[np.ndarray, " n"]:
+    """The part of which a photo's layer shows something where each of some Gaussians is: at its pixel, and at
+    its depth to within `SAME`; -1 where it does not."""
+    viewmat, K = (values.detach().cpu().double() for values in (scene.viewmats[view], scene.Ks[view]))
+    columns, lines, depths = (values.numpy() for values in pictured(viewmat, K, means))
+    width, height = scene.view_size
+    inside = (depths > 0) & (columns >= 0) & (columns < width) & (lines >= 0) & (lines < height)
+    pixels = np.where(inside, np.floor(lines) * width + np.floor(columns), 0).astype(int)
+    logs = np.log(np.where(inside, depths, 1.0))
+    shown, deep = np.full(width * height, -1), np.zeros(width * height)
+    own = np.flatnonzero(inside & of_view)
+    own = own[np.argsort(-logs[own], kind="stable")]  # of several in a pixel the nearest stays
+    shown[pixels[own]], deep[pixels[own]] = parts[own], logs[own]
+    return np.where(inside & (np.abs(logs - deep[pixels]) <= SAME), shown[pixels], -1)
 
 
 def connected(

@@ -36,16 +36,20 @@ def joined(
     Features stay as they are: f_i = sum_k w_ik d_k with the same w_ik and d_k. The second comes in
     the first's unit where both know theirs in metres. Views, photos and the rest of the record are the
     first's: cameras of the second would look at what is somewhere else now. They are antialiased where both
-    are. Where one alone has levels, or
-    confidences, all of the other is coarse, so that it is there in every picture, and sure.
+    are. Where one alone has levels, or confidences, all of the other is coarse, so that it is there in every
+    picture, and sure. If the first has layers, what comes is in all of them.
 
     Args:
+        second: without layers (`fused`), which the photos that it leaves behind would have to tell apart.
         names: of both, for people. shown: the first as edits changed it, beside which and in whose unit the
             second comes; None: as it is.
 
     Raises:
         InputError: their phrases mean different things, or together they have more than `MOST_ATOMS` atoms.
+        ValueError: the second has layers.
     """
+    if second.layered:
+        raise ValueError("second: expected a scene without layers, received one of layers; fuse it before")
     _check(first, second, names)
     placed = changed(second.gaussians, (beside(first if shown is None else shown, second),))
     gaussians = _stacked(first.gaussians, placed)

@@ -24,10 +24,11 @@ def describe(scene: "Scene") -> dict:
     """Counts, bytes, timings, warnings, and extent.
 
     Returns:
-        `gaussians, atoms, channels, weights_per_gaussian (mean), sh_degree, views, view_size,
-        photos, preset, source (the splat file it came from, or None), antialiased (trained to be drawn
-        so), space, bytes {field: bytes, total}, bounding_box and core_box {min, max} in scene units (None
-        when empty), metric_scale (metres per unit or None), world (None, or as `Record` has it), counts,
+        `gaussians, atoms, channels, weights_per_gaussian (mean), sh_degree, views, layers (how many photos
+        have one of their own, or None), view_size, photos, preset, source (the splat file it came from, or
+        None), antialiased (trained to be drawn so), space, bytes {field: bytes, total}, bounding_box and
+        core_box {min, max} in scene units (None when empty), metric_scale (metres per unit or None), world
+        (None, or as `Record` has it), counts,
         pruning (as `prune` left it, with `psnr_db` and `relevance_error` where they were measured),
         refinement (None, or kept, held_out and the PSNR before and after), detail (None, or as `Record` has
         it), light (None, or gains and offsets, a row of red, green and blue per view), lens and left_out
@@ -220,6 +221,7 @@ def _document(
         "weights_per_gaussian": float((arrays["weight_values"] > 0).sum()) / max(1, len(means)),
         "sh_degree": round(arrays["sh"].shape[1] ** 0.5) - 1,
         "views": len(arrays["viewmats"]),
+        "layers": _layers(arrays, known),
         "view_size": list(view_size),
         "photos": list(known.photos),
         "preset": known.preset,
@@ -242,6 +244,14 @@ def _document(
         "timings": {**timings, "total": sum(timings.values())} if timings else None,
         "warnings": list(known.warnings),
     }
+
+
+def _layers(arrays: Mapping[str, np.ndarray], known: Record) -> int | None:
+    """Photos with a layer of their own; None of a scene that has none."""
+    if not known.layered or "view_ids" not in arrays:
+        return None
+    ids = np.unique(arrays["view_ids"])
+    return int((ids >= 0).sum())
 
 
 def _tour(known: Record) -> dict | None:

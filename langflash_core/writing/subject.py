@@ -11,6 +11,7 @@ from langflash_core import segments
 from langflash_core.errors import PromptError
 from langflash_core.export import depth
 from langflash_core.export.answers import file_names, scaled_box
+from langflash_core.fused import fused_rows
 from langflash_core.geometry.fusion import Surface
 from langflash_core.types import Camera, Scene, SegmentedView, Segments
 from langflash_core.writing.renderers import Renderer
@@ -110,17 +111,20 @@ def boxes(subject: Subject) -> list[tuple[str, dict[str, Any]]]:
 
 
 def surfaces(subject: Subject) -> list[tuple[str, Surface]]:
-    """A mesh per phrase that some photo's view shows.
+    """A mesh per phrase that some photo's view shows, of the scene as one surface.
 
     Raises:
         MissingPackageError: scikit-image is not installed.
     """
-    scene, parts = subject.scene, subject.segments
+    parts, scene, members = subject.segments, subject.scene, subject.segments.members
+    if scene.layered:
+        rows = fused_rows(scene).cpu()
+        scene, members = scene.rows(rows).with_record(layered=False), members[:, rows]
     ratio = _SURFACE_SIDE / max(scene.view_size)
     width, height = (max(1, round(ratio * side)) for side in scene.view_size)
     cameras = [scene.camera(view, width, height) for view in range(scene.num_views)]
     meshes = [
-        (parts.prompts[p], segments.surface(scene, parts.members[p], cameras, subject.renderer))
+        (parts.prompts[p], segments.surface(scene, members[p], cameras, subject.renderer))
         for p in subject.found
     ]
     return [(name, mesh) for name, mesh in meshes if mesh is not None]

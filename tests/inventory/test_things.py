@@ -10,7 +10,7 @@ import torch
 from langflash_core.errors import InputError, PromptError
 from langflash_core.inventory import inventory
 from langflash_core.inventory.things import upright_box
-from tests.boxroom import CHAIRS, EYE, METRES, TABLE, box_room, without_language
+from tests.boxroom import CHAIRS, EYE, METRES, TABLE, box_room, in_layers, without_language
 
 
 @pytest.fixture(scope="module")
@@ -68,6 +68,23 @@ def test_things_are_all_of_their_gaussians_once(found):
     segments = found.segments()
     assert segments.counts == (1,) * len(found.things)
     assert segments.members.numpy().sum(1).tolist() == rows.sum(1).tolist()
+
+
+def test_things_of_layers_are_counted_once_and_are_those_of_all_layers(room, found):
+    layers = in_layers(room)
+    told = inventory(layers)
+    assert told.counts == found.counts
+    assert not told.scene.layered and told.given.layered and len(told.scene.gaussians) < len(layers.gaussians)
+    assert layers.view_ids is not None
+    segments = told.segments()
+    for number, thing in enumerate(told.things):
+        word = layers.semantics.weight_ids[segments.members[number], 0]
+        assert float((word == word.mode().values).float().mean()) > 0.9
+        shares = [
+            float((layers.view_ids[segments.members[number]] == view).float().mean()) for view in (0, 1)
+        ]
+        # the door is .03 m before a wall that layers of photos would not have there
+        assert min(shares) > 0.3 or thing.kind == "door"
 
 
 def test_scenes_of_nothing_or_without_language_are_refused(room):

@@ -136,3 +136,18 @@ def test_what_cannot_be_is_said(scene, draw):
     broken.means[::3] = torch.nan
     part, gone = clone(replace(scene, gaussians=broken), every(scene), (0.6, -0.2, 1.3), stroke, draw)
     assert bool(part.gaussians.means.isfinite().all()) and not bool(gone[::3].any())
+
+
+def test_in_layers_all_that_the_brush_shows_goes_and_every_layer_has_the_copies(scene, draw):
+    count = len(scene.gaussians)
+    twice = scene.rows(torch.arange(count).repeat(2))
+    means = twice.gaussians.means.clone()
+    means[count:] *= 1.05  # of the first photo's depths: beyond what one surface spans
+    ids = torch.arange(2).repeat_interleave(count)
+    layers = replace(twice, gaussians=replace(twice.gaussians, means=means), view_ids=ids)
+    layers = layers.with_record(layered=True)
+    place, source = (-0.2, -0.25, 1.3), (0.5, -0.25, 1.3)
+    part, gone = clone(layers, every(layers), source, stroke_on(scene, place), draw)
+    first, second = (gone[ids == view].sum() for view in range(2))
+    assert min(first, second) > 0.7 * max(first, second)
+    assert part.view_ids is not None and set(part.view_ids.tolist()) == {-1}

@@ -3,7 +3,8 @@
 import torch
 
 from langflash_core.mending.looks import before_and_after, drawn, mattes, reddened
-from langflash_core.splat import render
+from langflash_core.splat import compose, render
+from tests.splat.test_compose import layered
 
 
 def test_it_draws_as_the_reference_does(known):
@@ -36,3 +37,17 @@ def test_before_and_after_stand_beside_each_other(known, draw):
     assert torch.equal(
         reddened(known.scene, torch.zeros_like(known.members)).gaussians.sh, known.scene.gaussians.sh
     )
+
+
+def test_layers_are_blended_by_whoever_draws():
+    scene = layered([(2, 0.2, 0), (2.1, 0.8, 1)], [0.0, 0.5])
+    part = scene.semantics.weight_ids[:, 0] == 1
+    for view in range(2):
+        ours, theirs = drawn(scene, scene.camera(view)), compose.render(scene, scene.camera(view))
+        assert ours.weight_maps is not None and theirs.weight_maps is not None
+        # the rasteriser for processors stops at 1e-4 of the light
+        assert torch.allclose(ours.rgb, theirs.rgb, atol=3e-4)
+        assert torch.allclose(ours.depths, theirs.depths, atol=3e-3)
+        ((matte, depths),) = mattes(scene, part, [scene.camera(view)], drawn)
+        assert torch.allclose(matte, theirs.weight_maps[..., 1], atol=3e-4)
+        assert torch.equal(depths, ours.depths)

@@ -88,3 +88,18 @@ def test_few_are_left_alone_and_unknown_kinds_refused(planted):
     assert np.isinf(least_strengths(few, np.ones(5, bool))).all()
     with pytest.raises(InputError, match="no kind 'dust'"):
         least_strengths(few, np.ones(5, bool), ["dust"])
+
+
+def test_every_layer_is_looked_at_by_itself(planted):
+    """Two photos that see the same: nothing has more neighbours, or is less alone, for that."""
+    count = len(planted.gaussians)
+    twice = planted.rows(torch.arange(count).repeat(2))
+    ids = torch.arange(2).repeat_interleave(count)
+    layers = replace(twice, view_ids=ids).with_record(layered=True)
+    alone = kind_strengths(planted, np.ones(count, bool), ["floaters"])["floaters"]
+    for least in np.split(kind_strengths(layers, np.ones(2 * count, bool))["floaters"], 2):
+        assert np.array_equal(least, alone)
+    # What no photo made is in both, and goes where it is rubbish in both.
+    shared = torch.cat((torch.full((10,), -1), ids[10:]))
+    told = kind_strengths(replace(layers, view_ids=shared), np.ones(2 * count, bool))["floaters"]
+    assert np.isinf(told[:10]).all() and np.isinf(alone[:10]).all()

@@ -35,10 +35,12 @@ from langflash_core.scene.edits import (
 )
 from langflash_core.scene.edits_file import load_history, read_about, save_history, scene_digest
 from langflash_core.scene.file import load, save
+from langflash_core.scene.joining import joined
 from langflash_core.scene.tour import Note, Stop, Tour, told_tour
 from langflash_core.splat import render
 from langflash_core.types import Scene
 from tests.splat.scenes import camera, cloud
+from tests.splat.test_compose import layered
 
 COUNT, ATOMS = 1003, 9  # not a multiple of 8
 
@@ -339,3 +341,17 @@ def test_a_damaged_history_is_refused(scene, tmp_path: Path, spoil):
     path.write_text(spoil(path.read_text()))
     with pytest.raises(SceneFileError, match="edits\\.json"):
         load_history(path, scene)
+
+
+def test_what_a_merge_brought_is_saved_in_every_layer(tmp_path: Path):
+    first = layered([(2, 0.2, 0), (2, 0.8, 1)], [0.0, 0.5])
+    second = first.rows(torch.arange(20)).with_record(layered=False)
+    whole = joined(first, second)
+    saved = edited_scene(whole, first_marks(whole))
+    save(saved, tmp_path / "saved.langflash")
+    again = load(tmp_path / "saved.langflash")
+    assert again.layered and len(again.layer(0).gaussians) == len(first.layer(0).gaussians) + 20
+    with pytest.raises(ValueError, match="without layers"):
+        joined(second, first)
+    plain = joined(first.with_record(layered=False), second)
+    assert edited_scene(plain, first_marks(plain)).view_ids is None

@@ -1,5 +1,6 @@
 """What is said of a scene's detail, to people and to programs."""
 
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -9,6 +10,7 @@ from langflash_core.scene.file import load, save
 from langflash_core.scene.report import describe, describe_file, detail_line, left_out_line, lens_line
 from langflash_core.types import Scene
 from tests.scene.plane import wall_prediction
+from tests.splat.test_compose import layered
 
 DETAIL = {
     "level": "normal",
@@ -75,6 +77,20 @@ def test_a_file_keeps_it_and_programs_read_it_whole(scene, tmp_path):
 def test_a_scene_without_it_says_nothing(scene, tmp_path):
     save(scene, tmp_path / "a.langflash")
     assert scene.record.detail == {} and describe_file(tmp_path / "a.langflash")["detail"] is None
+
+
+def test_layers_are_counted_where_there_are_some(tmp_path):
+    scene = layered([(2, 0.2, 0), (2, 0.8, 1), (2, 0.5, 1)], [0.0, 0.5, 1.0])
+    assert scene.view_ids is not None
+    ids = scene.view_ids.clone()
+    ids[ids == 1] = -1  # what no photo made is no layer
+    for known, count in (
+        (scene, 3),
+        (replace(scene, view_ids=ids), 2),
+        (scene.with_record(layered=False), None),
+    ):
+        save(known, tmp_path / "a.langflash")
+        assert describe(known)["layers"] == describe_file(tmp_path / "a.langflash")["layers"] == count
 
 
 def test_a_found_lens_is_one_line():

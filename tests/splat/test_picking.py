@@ -4,10 +4,11 @@ import numpy as np
 import pytest
 import torch
 
-from langflash_core.splat import render
-from langflash_core.splat.picking import SEEN, projected, seen_in, weights_at
+from langflash_core.splat import compose, render
+from langflash_core.splat.picking import SEEN, seen_in, sights, weights_at
 from langflash_core.splat.reference import rasterize
 from tests.splat.scenes import camera, cloud
+from tests.splat.test_compose import camera_at, layered
 
 
 def box() -> np.ndarray:
@@ -26,9 +27,9 @@ def test_seen_is_what_adds_enough_to_some_pixel(hidden: bool) -> None:
     most = maps[torch.from_numpy(box())].amax(0).numpy()
     expected = np.zeros(200, bool)
     expected[rows[most >= SEEN]] = True
-    found = seen_in(scene.gaussians, visible, seen, box())
+    found = seen_in(scene, visible, seen, box())
     assert (found == expected).all() and 5 < found.sum() < len(rows)
-    through = seen_in(scene.gaussians, visible, seen, box(), through=True)
+    through = seen_in(scene, visible, seen, box(), through=True)
     assert through[found].all() and through.sum() > found.sum() and not through[~visible].any()
 
 
@@ -36,14 +37,42 @@ def test_a_pixel_is_weighed_as_the_weight_maps_hold_it() -> None:
     scene, seen = cloud(150, size=0.08), camera()
     maps = render(scene, seen).weight_maps
     assert maps is not None
-    rows, footprints = projected(scene.gaussians, np.ones(150, bool), seen)
+    shown = sights(scene, np.ones(150, bool), seen)
     for x, y in ((0, 0), (24, 20), (47, 39), (10, 31)):
-        weights = weights_at(scene.semantics, rows, footprints, x, y)
+        weights = weights_at(scene.semantics, shown, x, y)
         torch.testing.assert_close(weights.double(), maps[y, x].double(), rtol=0, atol=1e-6)  # float32 out
 
 
 def test_nothing_shown_is_nothing_seen_and_weighs_nothing() -> None:
     scene, seen = cloud(20), camera()
-    assert not seen_in(scene.gaussians, np.zeros(20, bool), seen, box()).any()
-    rows, footprints = projected(scene.gaussians, np.zeros(20, bool), seen)
-    assert not weights_at(scene.semantics, rows, footprints, 24, 20).any()
+    assert not seen_in(scene, np.zeros(20, bool), seen, box()).any()
+    assert not weights_at(scene.semantics, sights(scene, np.zeros(20, bool), seen), 24, 20).any()
+
+
+def test_a_pixel_of_layers_is_weighed_as_their_blend() -> None:
+    scene = layered([(2, 0.2, 0), (2.1, 0.8, 1), (5, 0.5, 2)], [0.0, 0.6, 1.0])
+    view = camera_at(scene, 0.3)
+    maps = compose.render(scene, view).weight_maps
+    assert maps is not None
+    shown = sights(scene, np.ones(len(scene.gaussians), bool), view)
+    for x, y in ((0, 0), (4, 3), (7, 7)):
+        weights = weights_at(scene.semantics, shown, x, y)
+        torch.testing.assert_close(weights, maps[y, x], rtol=0, atol=1e-5)  # float32 maps
+
+
+def test_what_is_pointed_at_is_found_in_all_layers_and_nothing_behind_it() -> None:
+    # A wall in three layers, and a fourth, of a photo near the third, that shows what lies far behind it.
+    scene = layered([(2, 0.2, 0), (2.1, 0.8, 1), (1.95, 0.5, 2), (5, 0.5, 3)], [0.0, 0.3, 0.6, 0.7])
+    assert scene.view_ids is not None
+    ids, visible = scene.view_ids.numpy(), np.ones(len(scene.gaussians), bool)
+    pixels = np.zeros((8, 8), bool)
+    pixels[3:6, 2:5] = True
+    found = seen_in(scene, visible, camera_at(scene, 0.0), pixels)
+    assert [int(found[ids == view].sum()) > 3 for view in range(4)] == [True, True, True, False]
+    alone = [
+        seen_in(scene.layer(view), visible[ids == view], camera_at(scene, 0.0), pixels) for view in range(3)
+    ]
+    for view in range(3):  # as in a scene of that layer alone
+        assert (found[ids == view] == alone[view]).mean() > 0.98  # float32 about the least share
+    through = seen_in(scene, visible, camera_at(scene, 0.0), pixels, through=True)
+    assert through[ids == 3].any() and not found[~through].any()

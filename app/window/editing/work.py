@@ -41,7 +41,7 @@ from .teaching import WordsFound, with_kept
 if TYPE_CHECKING:
     from torch import Tensor
 
-    from langflash_core.types import Gaussians, Scene
+    from langflash_core.types import Scene
 
 MOST_PIXELS = 120_000  # of a region; a larger one is looked at coarser, which takes seconds less
 WORDS_ASKED, WORDS_OF_ATOM = 6, 3
@@ -58,9 +58,9 @@ class EditErrand(SceneErrand):
     def scene(self) -> "Scene":
         return self.memory.scene
 
-    def placed(self) -> "Gaussians":
-        """Its Gaussians where edits moved them."""
-        return self.memory.changed(self.marks).gaussians
+    def placed(self) -> "Scene":
+        """With its Gaussians where edits moved them."""
+        return self.memory.changed(self.marks)
 
     def spoken(self) -> "Scene":
         """The scene with its atoms merged and silenced as marked."""
@@ -135,7 +135,7 @@ class FindThing(AtPixel):
     space."""
 
     def run(self, stopping: Asked) -> Iterator[Command]:
-        from langflash_core.scene.instances import instances
+        from langflash_core.scene.instances import things
         from langflash_core.scene.selection import strongest_atoms
 
         seen = self.seen()
@@ -145,10 +145,10 @@ class FindThing(AtPixel):
         if len(of_one) and of_one.max() >= 0:
             group = np.bincount(of_one[of_one >= 0]).argmax()
             members = np.isin(groups, self._alike(int(group))) & self.marks.visible.rows()
-            things = instances(self.placed(), members)
-            here = things[seen & (things > 0)]
+            numbers = things(self.placed(), members)
+            here = numbers[seen & (numbers > 0)]
             if len(here):
-                seen = things == np.bincount(here).argmax()
+                seen = numbers == np.bincount(here).argmax()
         yield Found(Mask.of(seen), self.combine, "of a thing")
 
     def _alike(self, group: int) -> np.ndarray:
@@ -169,7 +169,7 @@ class FindInSphere(AtPixel):
     radius: float
 
     def run(self, stopping: Asked) -> Iterator[Command]:
-        found, means = self.seen(), self.placed().means.double().numpy()
+        found, means = self.seen(), self.placed().gaussians.means.double().numpy()
         if found.any():
             centre = np.median(means[found], axis=0)
             camera = to_camera(self.pose, *self.size)
@@ -241,13 +241,23 @@ class GrowSelection(Selection):
         from langflash_core.scene.instances import disc_radii
         from langflash_core.scene.selection import grow, spacing
 
-        placed = self.placed()
+        placed = self.placed().gaussians
         means, radii = placed.means.numpy(), disc_radii(placed)
         visible = self.marks.visible.rows()
         allowed = visible & self.within.meant() if self.within else visible
-        distance = self.reach * spacing(means[visible])
+        distance = self.reach * spacing(means[visible & self._of_one_layer(visible)])
         found = grow(means, self.marks.selected.rows(), allowed, distance, radii)
         yield Found(Mask.of(found), "add", f"around, {self.within.text!r}" if self.within else "around")
+
+    def _of_one_layer(self, visible: np.ndarray) -> np.ndarray:
+        """(N,) bool: of a scene of layers those of the largest one, in which neighbours are as far apart as a
+        surface has them; else all."""
+        ids = self.scene.view_ids
+        if not self.scene.layered or ids is None:
+            return np.ones_like(visible)
+        numbers = ids.numpy()
+        counts = np.bincount(numbers[visible & (numbers >= 0)], minlength=1)
+        return numbers == counts.argmax() if counts.any() else np.ones_like(visible)
 
 
 @dataclass(frozen=True)
@@ -380,16 +390,16 @@ class Weigh(EditErrand):
 
     def weigh(self) -> np.ndarray:
         """Weights (K,) of the pixel, composed exactly; a view is projected once for all its pixels."""
-        from langflash_core.splat.picking import projected, weights_at
+        from langflash_core.splat.picking import sights, weights_at
 
         x, y = (min(max(int(at), 0), side - 1) for at, side in zip(self.reading.at, self.size, strict=True))
         visible, camera = self.marks.visible, to_camera(self.pose, *self.size)
-        rows, footprints = self.memory.answered(
-            "footprints",
+        seen = self.memory.answered(
+            "sights",
             (self.marks.changes, visible, self.pose, self.size),
-            lambda: projected(self.placed(), visible.rows(), camera),
+            lambda: sights(self.placed(), visible.rows(), camera),
         )
-        return weights_at(self.scene.semantics, rows, footprints, x, y).numpy()
+        return weights_at(self.scene.semantics, seen, x, y).numpy()
 
     def weighed(self, weights: np.ndarray) -> Reading:
         """The reading with its groups."""

@@ -48,7 +48,8 @@ class TakeInventory(SceneErrand):
         if stopping():
             return
         there = self.marks.left.rows()
-        yield Listed(tuple(_row(found, thing, there) for thing in found.things), found.unit, found.guess)
+        listed = tuple(_row(found, number, there) for number in range(len(found.things)))
+        yield Listed(listed, found.unit, found.guess)
         for thing in found.things:
             rgb = small_picture(scene, found.scene.gaussians.means.numpy()[thing.rows], thing.photos)
             if rgb is not None:
@@ -59,9 +60,10 @@ class TakeInventory(SceneErrand):
         return (NotListed(sentence),)
 
 
-def _row(found: "Inventory", thing: "Thing", there: np.ndarray) -> Row:
-    rows = np.zeros(len(there), bool)
-    rows[there] = thing.rows
+def _row(found: "Inventory", number: int, there: np.ndarray) -> Row:
+    """Of one of its things. there (N,): the rows of the scene that it was made of."""
+    thing, rows = found.things[number], np.zeros(len(there), bool)
+    rows[there] = found.numbers == number
     return Row(
         thing.id, thing.kind, thing.sure, thing.place, thing.size, thing.bottom, thing.photos, thing.cut,
         Mask.of(rows), corners_of(found, thing),

@@ -23,12 +23,16 @@ def keeps_near(state: State, pose: Pose | None = None) -> bool:
 
 def photos_known(state: State) -> bool:
     """Whether photos made all there is: not where a file does not say, nor with what a merge brought, which
-    is behind all else."""
+    is behind all else. What fills a hole in all layers nobody saw, and it is where photos look."""
     info, marks = state.scene.info, state.editing.marks
     if info is None or info.scene.view_ids is None:
         return False
     count = len(info.scene.view_ids) if marks is None else marks.there[0]
-    return count > 0 and int(info.scene.view_ids[count - 1]) >= 0
+    if count == 0:
+        return False
+    sure, layered = info.scene.confidences, info.scene.layered
+    fills = layered and sure is not None and float(sure[count - 1]) == 0
+    return fills or int(info.scene.view_ids[count - 1]) >= 0
 
 
 def fills_gaps(state: State) -> bool:

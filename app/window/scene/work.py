@@ -123,12 +123,13 @@ class JoinScenes(Job):
 
     def run(self, serial: int, progress: Callable[[str, float], None], cancelled: Asked) -> Merged:
         from langflash_core.export import read as read_scene
+        from langflash_core.fused import fused
         from langflash_core.scene.edited import edited_scene, there
         from langflash_core.scene.joining import joined
 
         own, name = self.info, self.path.name
         first, shown = there(own.scene, self.marks), edited_scene(own.scene, self.marks)
-        scene = joined(first, read_scene(self.path), (own.name, name), shown)
+        scene = joined(first, fused(read_scene(self.path)), (own.name, name), shown)
         info = describe_scene(scene, serial, own.name, own.path)
         return Merged(own.serial, self.marks.there, info, name)
 

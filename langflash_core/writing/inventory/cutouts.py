@@ -25,7 +25,7 @@ def cutouts_of(found: Inventory, renderer: Renderer, progress: Progress) -> dict
     if not found.things:
         return {}
     segments = found.segments()
-    scene, cutouts = carrying(found.scene, segments), {}
+    scene, cutouts = carrying(found.given, segments), {}
     best = [thing.photos[0] if thing.photos else 0 for thing in found.things]
     for view in sorted(set(best)):
         progress("cutting out", 0.3 + 0.6 * view / found.scene.num_views)

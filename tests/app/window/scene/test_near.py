@@ -45,6 +45,18 @@ def test_nothing_is_kept_to_where_nobody_knows_the_photos_or_wants_to(state: Sta
     assert places_to_keep_to(shown_scene()) == () == places_to_keep_to(State())
 
 
+def test_what_fills_a_hole_of_all_layers_is_where_photos_look_and_a_merge_is_not(state: State) -> None:
+    assert state.scene.info is not None
+    scene = state.scene.info.scene
+    ids = torch.zeros(len(scene.gaussians), dtype=torch.int64)
+    ids[-5:] = -1
+    for layered, sure, known in ((True, 0.0, True), (True, 1.0, False), (False, 0.0, False)):
+        confidences = torch.full((len(ids),), sure)
+        made = replace(scene, view_ids=ids, confidences=confidences).with_record(layered=layered)
+        shown = state.with_scene(info=replace(state.scene.info, scene=made))
+        assert bool(places_to_keep_to(shown)) == known
+
+
 def test_gaps_are_filled_in_scenes_of_photos_and_not_around_a_thing(state: State) -> None:
     assert fills_gaps(state) and not fills_gaps(shown_scene()) and not fills_gaps(State())
     assert not fills_gaps(replace(state, preferences=replace(state.preferences, fill_gaps=False)))
