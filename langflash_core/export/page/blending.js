@@ -59,10 +59,10 @@ class LayeredDrawing {
     const parts = cut ? [...this.layers.keys()].map((place) => ({ place })) : chosen;
     const seen = this.moving ? parts.slice(0, MOVING) : parts;
     const asked = numbers ? numbers.layers : 0;
-    const stride = 1 + (numbers || !over ? asked + 1 : 0);
+    const stride = 1 + asked + (over ? 0 : 1);
     const pictures = this.pictures(target, stride * seen.length);
     for (const [index, { place }] of seen.entries()) {
-      const carried = stride > 1 ? this.carried(place, numbers) : null;
+      const carried = stride > 1 ? this.carried(place, numbers, !over) : null;
       const own = this.slice(pictures, index * stride, stride, target.size);
       this.layers[place].drawing.splat(own, camera, lens, carried, near);
     }
@@ -70,15 +70,17 @@ class LayeredDrawing {
     this.blend(target, camera, seen, { LAYERS: asked, STRIDE: stride, OVER: over ? 1 : 0 });
   }
 
-  // What a layer carries: numbers of phrases, if any are asked, and the places of its Gaussians from its photo's.
-  carried(place, numbers) {
+  // What a layer carries: numbers of phrases, if any are asked, and to be blended the places of its Gaussians from its
+  // photo's.
+  carried(place, numbers, placed) {
     const kept = numbers ? numbers.uploaded : this.places;
-    if (!kept.has(place)) {
+    const key = `${place} ${placed}`;
+    if (!kept.has(key)) {
       const { texels, drawing } = this.layers[place];
       const asked = numbers ? numbers.of(place) : { texels: [], layers: 0 };
-      kept.set(place, drawing.upload(withPlaces(asked, texels, this.photos[place].eye)));
+      kept.set(key, drawing.upload(placed ? withPlaces(asked, texels, this.photos[place].eye) : asked));
     }
-    return kept.get(place);
+    return kept.get(key);
   }
 
   // The pictures of layers that belong to a target, at least `depth` of them.
