@@ -3,7 +3,7 @@
 
 Of a scene of layers the Gaussians come layer by layer, then those that no photo made. Where a layer's lie in
 the picture of its own photo, they are stored there: on the photo's grid, where they were made, what differs
-from one to the next is short, and three eighths of a page are saved. Red and blue are stored as what they
+from one to the next is short, and a page is a quarter smaller. Red and blue are stored as what they
 differ from green.
 """
 

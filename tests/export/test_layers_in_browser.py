@@ -24,7 +24,7 @@ pytestmark = needs_browser
 
 LEAST_DB = 45.0
 """Of a picture and the float64 blend. Rotations of 8 bits, books of 256 and float16 leave 67; 50 where a wall
-seen straight on has Gaussians at one depth, whose order a last bit decides. Another blend gives 31 and less."""
+seen straight on has Gaussians at one depth, ordered by a last bit. Another blend gives 31 and less."""
 NUM_VIEWS = 6
 _PICTURE = """langflash.then((page) => {
   const target = page.drawing.target(SIZE, 0);

@@ -191,7 +191,7 @@ class LayeredPage extends Page {
     this.told.hidden = !layers;
     if (!layers) return;
     const held = layers.length < views.length ? `${layers.length} of ${views.length}` : `${layers.length}`;
-    this.told.textContent = `Pictures are blended of the nearest photos; the page holds ${held}.`;
+    this.told.textContent = `Pictures are blended of the nearest photos’ layers; the page holds ${held}.`;
   }
 }
 
