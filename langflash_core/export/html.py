@@ -35,6 +35,7 @@ from torch import Tensor
 from langflash_core.colormaps import HEAT_STOPS
 from langflash_core.export.packing import check_some, morton_order
 from langflash_core.export.page_columns import (
+    Column,
     gaussian_columns,
     in_layers,
     layered_columns,
@@ -210,13 +211,7 @@ def _encoded(scene: Scene, phrases: Phrases | None) -> tuple[dict, bytes]:
     origin = invert_rigid(scene.viewmats[0].double())[:3, 3]
     if scene.view_ids is None:  # in no order that says what is near
         scene = scene.rows(torch.from_numpy(morton_order(scene.gaussians.means.double().cpu().numpy())))
-    if scene.layered and bool((scene.view_ids >= 0).any()):
-        distance = median_distance(scene)  # of some, in the scene's own order
-        scene = in_layers(scene)
-        books, columns = layered_columns(scene, origin)
-        books["distance"] = distance
-    else:
-        books, columns = gaussian_columns(scene, origin)
+    held, books, columns = _held(scene, origin)
     header = {
         "format": _FORMAT,
         "version": _VERSION,
@@ -234,7 +229,7 @@ def _encoded(scene: Scene, phrases: Phrases | None) -> tuple[dict, bytes]:
             "texts": list(phrases.texts), "asked": phrases.num_asked, "atoms": len(phrases.gram),
             "temperature": phrases.temperature, "threshold": phrases.threshold,
         }  # fmt: skip
-        columns += weight_columns(scene)
+        columns += weight_columns(held)
         tables = {
             "scores": phrases.scores, "negatives": phrases.negatives, "gram": phrases.gram,
             "dictionary": phrases.dictionary,
@@ -242,6 +237,16 @@ def _encoded(scene: Scene, phrases: Phrases | None) -> tuple[dict, bytes]:
         columns += [table_column(name, table, header) for name, table in tables.items() if table is not None]
     header["columns"] = [[c.name, c.values.size, c.width, c.differences] for c in columns]
     return header, b"".join(column.packed() for column in columns)
+
+
+def _held(scene: Scene, origin: Tensor) -> tuple[Scene, dict, list[Column]]:
+    """The scene in the order in which the page holds it; what of the header its Gaussians need, and their
+    columns."""
+    if not scene.layered or scene.view_ids is None or not bool((scene.view_ids >= 0).any()):
+        return scene, *gaussian_columns(scene, origin)
+    held = in_layers(scene)
+    books, columns = layered_columns(held, origin)
+    return held, {**books, "distance": median_distance(scene)}, columns
 
 
 def _views(scene: Scene, origin: Tensor) -> list[dict]:
