@@ -12,7 +12,6 @@ from langflash_core.ahead import Ahead
 from langflash_core.detail import DEFAULT_DETAIL
 from langflash_core.errors import InputError, PromptError, ViewError
 from langflash_core.export.html import Beside, Phrases, TextModel, write_html
-from langflash_core.fused import fused
 from langflash_core.images.decode import grey_photo
 from langflash_core.images.lens import Intrinsics
 from langflash_core.language.answers import answer
@@ -31,9 +30,12 @@ from langflash_core.running import Progress, Run
 from langflash_core.scene.exposure import lit_camera
 from langflash_core.scene.tour import Note, Stop, read_tour
 from langflash_core.splat import render as render_reference
+from langflash_core.splat.compose import some_layers
 from langflash_core.types import Camera, Frame, QueryResult, Scene
 
 LARGEST_PICTURE = 8192
+PAGE_LAYERS = 8
+"""Layers of a page: 12 MB, which people still send; a view is blended of the four nearest."""
 
 
 def reconstruct(
@@ -196,7 +198,8 @@ def web_page(
     title: str | None = None,
     beside: Mapping[str, Scene] | None = None,
 ) -> Phrases | None:
-    """Write a web page that shows the scene and answers these phrases and the whole vocabulary.
+    """Write a web page that shows the scene and answers these phrases and the whole vocabulary; of a scene of
+    layers it holds those of `page_layers`.
 
     Args:
         prompts: shown as asked from the start.
@@ -213,7 +216,7 @@ def web_page(
         InputError: a scene speaks another space than the first, or none that `with_text` reads.
         OutputError: the scene holds no Gaussians, or the path cannot be written.
     """
-    scene, others = fused(scene), {name: fused(other) for name, other in (beside or {}).items()}
+    scene, others = page_layers(scene), {name: page_layers(other) for name, other in (beside or {}).items()}
     said = {other.semantics.space for other in (scene, *others.values())}
     if len(said) > 1:
         raise InputError(
@@ -237,6 +240,11 @@ def web_page(
         beside=[Beside(s, name, own) for (name, s), own in zip(others.items(), rest, strict=True)],
     )
     return first
+
+
+def page_layers(scene: Scene) -> Scene:
+    """The scene as a page holds it: of many layers `PAGE_LAYERS` that lie all over the walk."""
+    return some_layers(scene, PAGE_LAYERS) if scene.layered else scene
 
 
 def _of_tour(scene: Scene) -> tuple[Stop | Note, ...]:

@@ -8,6 +8,8 @@ camera, at most four weights each in 8 bits. Phrases are numbers per atom, d_k .
 needs neither dictionary nor text tower, and answers those that it was made with. With a text model it holds
 both, deflated as they are, and answers any phrase.
 
+Of a scene of layers the page holds each layer (`page_columns.py`) and draws as `splat/compose.py` has it.
+
 A page may hold several scenes; the first one is shown, and each answers the same phrases. Stops and notes
 of a scene's tour come along, cameras with the page's own lens.
 
@@ -32,8 +34,15 @@ from torch import Tensor
 
 from langflash_core.colormaps import HEAT_STOPS
 from langflash_core.export.packing import check_some, morton_order
+from langflash_core.export.page_columns import (
+    Column,
+    gaussian_columns,
+    in_layers,
+    layered_columns,
+    table_column,
+    weight_columns,
+)
 from langflash_core.export.png import DIM, GLOW
-from langflash_core.export.quantised import quantised
 from langflash_core.files import write_atomically
 from langflash_core.geometry.cameras import invert_rigid
 from langflash_core.geometry.poses import from_view
@@ -43,13 +52,14 @@ from langflash_core.scene.tour import Stop, read_tour
 from langflash_core.scene.world import turn_of
 from langflash_core.types import Scene
 
-MOST_WEIGHTS = 4  # of a Gaussian; `langflash bench` says what the others are worth
 SCRIPTS = (
     "decode", "cameras", "sorting", "answers", "drawing", "worlds", "moving", "asking", "address", "touring",
-    "notes", "plan", "embedding", "main",
+    "notes", "plan", "embedding", "page", "alone", "main",
 )  # fmt: skip
 READING = "words"  # beside a text model
+LAYERED = ("layers", "blending")  # instead of "alone", where a scene of the page has layers
 _SHADERS = ("splat.vert", "splat.frag", "screen.vert", "show.frag")
+_BLENDING = "blend.frag"
 _FORMAT, _VERSION = "langflash-page", 1
 _SLOT = re.compile(r"<!-- (\w+) -->")
 _COMMENT = re.compile(r"^ *//.*\n", re.MULTILINE)  # a line of its own
@@ -93,26 +103,6 @@ class TextModel:
     licence: str
 
 
-@dataclass(frozen=True)
-class _Column:
-    """Integers under a name: `width` bytes each, as they are or as differences."""
-
-    name: str
-    values: np.ndarray
-    width: int = 1
-    differences: bool = False
-
-    def packed(self) -> bytes:
-        """As the page's program reads it."""
-        top = 1 << 8 * self.width
-        values = self.values.astype(np.int64).ravel()
-        if self.differences:
-            values = np.diff(values, prepend=0) % top
-            if self.width == 2:  # 1, -1, 2, -2, ... are 2, 1, 4, 3, ...
-                values = np.where(values < top // 2, 2 * values, 2 * (top - values) - 1)
-        return b"".join((values >> 8 * byte & 255).astype(np.uint8).tobytes() for byte in range(self.width))
-
-
 def write_html(
     scene: Scene,
     path: Path,
@@ -141,6 +131,13 @@ def write_html(
     write_atomically(path, _page(scenes, text_model).encode())
 
 
+def programs(*, reading: bool, layered: bool) -> tuple[str, ...]:
+    """The scripts of a page, in order: of one that reads words itself, and of one that holds layers."""
+    place = SCRIPTS.index("alone")
+    drawn = (*SCRIPTS[:place], *LAYERED, *SCRIPTS[place + 1 :]) if layered else SCRIPTS
+    return (READING, *drawn) if reading else drawn
+
+
 def _page(scenes: Sequence[tuple[dict, bytes]], text_model: TextModel | None) -> str:
     """The whole page; what is put in is not looked through for more places to fill."""
     folder = Path(__file__).parent / "page"
@@ -148,10 +145,12 @@ def _page(scenes: Sequence[tuple[dict, bytes]], text_model: TextModel | None) ->
     def source(name: str) -> str:
         return (folder / name).read_text(encoding="utf-8")
 
-    names = SCRIPTS if text_model is None else (READING, *SCRIPTS)
+    layered = any("layers" in header for header, _ in scenes)
+    names = programs(reading=text_model is not None, layered=layered)
     program = _COMMENT.sub("", "\n".join(source(f"{name}.js") for name in names))
     script = f'\n"use strict";\n(() => {{\n{program}}})();\n'
-    shaders = {name: _COMMENT.sub("", shader_source(f"web/{name}")) for name in _SHADERS}
+    passes = (*_SHADERS, _BLENDING) if layered else _SHADERS
+    shaders = {name: _COMMENT.sub("", shader_source(f"web/{name}")) for name in passes}
     drawn = {"shaders": shaders, "constants": _constants()}
     parts = {
         "title": html.escape(scenes[0][0]["title"]),
@@ -212,7 +211,7 @@ def _encoded(scene: Scene, phrases: Phrases | None) -> tuple[dict, bytes]:
     origin = invert_rigid(scene.viewmats[0].double())[:3, 3]
     if scene.view_ids is None:  # in no order that says what is near
         scene = scene.rows(torch.from_numpy(morton_order(scene.gaussians.means.double().cpu().numpy())))
-    books, columns = _gaussian_columns(scene, origin)
+    held, books, columns = _held(scene, origin)
     header = {
         "format": _FORMAT,
         "version": _VERSION,
@@ -230,14 +229,24 @@ def _encoded(scene: Scene, phrases: Phrases | None) -> tuple[dict, bytes]:
             "texts": list(phrases.texts), "asked": phrases.num_asked, "atoms": len(phrases.gram),
             "temperature": phrases.temperature, "threshold": phrases.threshold,
         }  # fmt: skip
-        columns += _weight_columns(scene)
+        columns += weight_columns(held)
         tables = {
             "scores": phrases.scores, "negatives": phrases.negatives, "gram": phrases.gram,
             "dictionary": phrases.dictionary,
         }  # fmt: skip
-        columns += [_shares(name, table, header) for name, table in tables.items() if table is not None]
+        columns += [table_column(name, table, header) for name, table in tables.items() if table is not None]
     header["columns"] = [[c.name, c.values.size, c.width, c.differences] for c in columns]
     return header, b"".join(column.packed() for column in columns)
+
+
+def _held(scene: Scene, origin: Tensor) -> tuple[Scene, dict, list[Column]]:
+    """The scene in the order in which the page holds it; what of the header its Gaussians need, and their
+    columns."""
+    if not scene.layered or scene.view_ids is None or not bool((scene.view_ids >= 0).any()):
+        return scene, *gaussian_columns(scene, origin)
+    held = in_layers(scene)
+    books, columns = layered_columns(held, origin)
+    return held, {**books, "distance": median_distance(scene)}, columns
 
 
 def _views(scene: Scene, origin: Tensor) -> list[dict]:
@@ -291,51 +300,3 @@ def _stop(stop: Stop, fov: float, origin: np.ndarray) -> dict:
     eye = pose.pivot - distance * pose.axes[:, 2] - origin
     said = {"name": stop.name, "text": stop.text, "phrase": stop.phrase}
     return {**said, "eye": eye.tolist(), "turn": pose.axes.T.tolist(), "distance": distance}
-
-
-def _gaussian_columns(scene: Scene, origin: Tensor) -> tuple[dict, list[_Column]]:
-    """What of the header the Gaussians need, and their columns."""
-    around = scene.gaussians.means.double().cpu() - origin.cpu()
-    stored = quantised(scene.gaussians.map(lambda values: values.cpu()), around)
-    columns = [_Column("largest", stored.largest), _Column("opacity", stored.opacities, differences=True)]
-    for axis in range(3):
-        columns += [
-            _Column(f"mean{axis}", stored.steps[:, axis], 2, True),
-            _Column(f"turn{axis}", stored.turns[:, axis], differences=True),
-            _Column(f"scale{axis}", stored.scales[:, axis], differences=True),
-            _Column(f"colour{axis}", stored.colours[:, axis], differences=True),
-        ]
-    header = {
-        "lowest": stored.lowest.tolist(),
-        "highest": stored.highest.tolist(),
-        "scaleBook": stored.scale_book.tolist(),
-        "colourBook": stored.colour_book.tolist(),
-    }
-    if stored.harmonics is not None:
-        palette = stored.harmonics
-        header |= {"harmonicsBook": palette.book.tolist(), "bases": palette.places.shape[1]}
-        columns += [_Column("palette", palette.places), _Column("label", palette.labels, 2)]
-    return header, columns
-
-
-def _weight_columns(scene: Scene) -> list[_Column]:
-    """The largest weights of each Gaussian, of 255 in sum."""
-    semantics = scene.semantics
-    values, places = semantics.weight_values.cpu().topk(min(MOST_WEIGHTS, semantics.weight_ids.shape[1]), 1)
-    ids = semantics.weight_ids.cpu().gather(1, places).numpy()
-    shares = torch.nan_to_num(values / values.sum(1, keepdim=True).clamp_min(1e-9)).double().numpy()
-    steps = np.round(255 * shares).astype(int)
-    ids = np.where(steps > 0, ids, 0)
-    width = 1 if semantics.num_atoms <= 256 else 2
-    columns = []
-    for place in range(steps.shape[1]):
-        columns += [_Column(f"atom{place}", ids[:, place], width), _Column(f"weight{place}", steps[:, place])]
-    return columns
-
-
-def _shares(name: str, numbers: Tensor, header: dict) -> _Column:
-    """Signed numbers in 16 bits of the largest, which the header takes."""
-    values = numbers.detach().double().cpu().numpy()
-    largest = max(float(np.abs(values).max(initial=0)), 1e-9)
-    header["phrases"][f"{name}Unit"] = largest / 32767
-    return _Column(name, np.round(values / largest * 32767).astype(int) % 65536, 2)

@@ -75,11 +75,7 @@ class Nearness:
     def chosen(self, camera: Camera, most: int = NEAREST) -> Chosen:
         """The layers that a camera sees, at most so many."""
         viewmat = camera.viewmat.detach().cpu().double().numpy()
-        centre, axis = -viewmat[:3, :3].T @ viewmat[:3, 3], viewmat[2, :3]
-        ways = np.linalg.norm(self.centres - centre, axis=1) / self.distance
-        # |a - a'| = 2 sin(angle / 2) of unit axes: small angles keep their digits, which arccos loses
-        chords = np.linalg.norm(self.axes - axis, axis=1)
-        far = ways + 2 * np.arcsin(np.minimum(chords / 2, 1)) + FLOOR
+        far = self._apart(-viewmat[:3, :3].T @ viewmat[:3, 3], viewmat[2, :3]) + FLOOR
         order = np.argsort(far, kind="stable")
         near = order[:most]
         weights = far[near] ** -2.0 - (far[order[most]] ** -2.0 if len(order) > most else 0.0)
@@ -87,6 +83,37 @@ class Nearness:
             weights = np.ones(len(near))
         kept = weights > 0
         return Chosen(tuple(self.views[v] for v in near[kept]), weights[kept] / weights.sum())
+
+    def spread(self, most: int) -> tuple[int, ...]:
+        """At most so many of the views that lie all over the walk: the first, then each time the one that is
+        farthest from those chosen so far; in the scene's order."""
+        nearest = np.full(len(self.views), np.inf)
+        chosen: list[int] = []
+        while len(chosen) < min(most, len(self.views)):
+            chosen.append(int(nearest.argmax()))
+            nearest = np.minimum(nearest, self._apart(self.centres[chosen[-1]], self.axes[chosen[-1]]))
+            nearest[chosen] = -1
+        return tuple(self.views[v] for v in sorted(chosen))
+
+    def _apart(
+        self, centre: Float[np.ndarray, " 3"], axis: Float[np.ndarray, " 3"]
+    ) -> Float[np.ndarray, " V"]:
+        """d_v + a_v of a camera at `centre` that looks along unit `axis`."""
+        ways = np.linalg.norm(self.centres - centre, axis=1) / self.distance
+        # |a - a'| = 2 sin(angle / 2) of unit axes: small angles keep their digits, which arccos loses
+        chords = np.linalg.norm(self.axes - axis, axis=1)
+        return ways + 2 * np.arcsin(np.minimum(chords / 2, 1))
+
+
+def some_layers(scene: Scene, most: int) -> Scene:
+    """A scene of layers with at most so many of them, all over the walk; with one or none, a scene without
+    layers."""
+    assert scene.view_ids is not None
+    kept = Nearness.of(scene).spread(most)
+    if len(kept) <= 1:
+        return scene.layer(*kept) if kept else scene.with_record(layered=False)
+    ids = scene.view_ids
+    return scene.rows((ids < 0) | torch.isin(ids, torch.tensor(kept, device=ids.device)))
 
 
 def shares(

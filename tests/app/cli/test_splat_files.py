@@ -20,6 +20,7 @@ from langflash_core.outputs import ALL_OUT
 from langflash_core.scene.file import save
 from langflash_core.types import Scene
 from tests.app.cli.conftest import HEIGHT, WIDTH, WORDS, stripes
+from tests.app.gl.test_gl_layers import layered
 from tests.export.pages import read_page
 from tests.export.splats import damaged_files
 
@@ -120,6 +121,18 @@ def test_a_page_holds_the_whole_scene_and_the_phrases(run, refused, scene_file, 
     assert "'minilm' only" in refused("export", ply_file, "-o", page, "--with-text")
     assert "needs a phrase" in refused("export", scene_file, "-o", page, "--threshold", "0.5")
     assert "takes a .png" in refused("export", scene_file, "-o", page, "--what", "rgb")
+
+
+@pytest.mark.parametrize(
+    ("photos", "said"), [(12, "in 8 of 12 layers"), (3, "in 3 layers"), (1, "Gaussians, ")]
+)
+def test_a_page_says_how_many_layers_it_holds(run, tmp_path, photos, said):
+    walk = layered(photos, count=60, num_atoms=0)
+    quats = torch.nn.functional.normalize(walk.gaussians.quats, dim=1)
+    save(replace(walk, gaussians=replace(walk.gaussians, quats=quats)), tmp_path / "walk.langflash")
+    outcome = run("export", tmp_path / "walk.langflash", "-o", tmp_path / "a.html")
+    assert outcome.code == 0, outcome.err
+    assert said in outcome.out
 
 
 @pytest.mark.parametrize("suffix", IN_ORDER)
