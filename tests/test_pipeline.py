@@ -375,12 +375,3 @@ def test_a_refinement_needs_seconds_and_two_photos(weights, photos):
         lf.reconstruct(photos, weights=weights, refine_seconds=0)
     with pytest.raises(InputError, match="at least two"):
         lf.reconstruct(photos[:1], weights=weights, refine_seconds=5)
-
-
-def test_layers_that_cannot_be_had_are_said_to_be_left_out(weights, photos):
-    flat = lf.reconstruct(photos, weights=weights, size=SMALL, detail=None, layers=True)
-    assert not flat.layered and any("layers" in warning for warning in flat.record.warnings)
-    layered = lf.reconstruct(photos, weights=weights, size=SMALL, layers=True)
-    assert layered.layered and not any("layers" in warning for warning in layered.record.warnings)
-    with pytest.raises(InputError, match="layers"):
-        lf.reconstruct(photos, layers=True, refine_seconds=1)

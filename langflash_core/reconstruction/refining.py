@@ -22,13 +22,12 @@ def refined(
     except InputError as reason:
         return scene.with_record(warnings=(*scene.record.warnings, f"not refined: {reason}"))
     fitted = result.recorded().scene
-    warnings = scene.record.warnings
-    if not result.kept:
-        record = fitted.record.refinement
-        before, after = record["held_out_psnr_db"]
-        note = f"not refined: {record['held_out']}, held out, came no closer ({before} dB, then {after} dB)"
-        warnings = (*warnings, note)
-    return _moved(fitted, "cpu").with_record(warnings=warnings)
+    if result.kept:
+        return _moved(fitted, "cpu")
+    record = fitted.record.refinement
+    before, after = record["held_out_psnr_db"]
+    note = f"not refined: {record['held_out']}, held out, came no closer ({before} dB, then {after} dB)"
+    return scene.with_record(refinement=record, warnings=(*scene.record.warnings, note))
 
 
 def _moved(scene: Scene, device: str) -> Scene:
