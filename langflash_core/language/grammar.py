@@ -160,6 +160,11 @@ class Reading:
         return ", ".join((self.head, *(str(each) for each in self.modifiers)))
 
 
+def whole(phrase: str) -> Reading:
+    """A phrase that is asked as it stands."""
+    return Reading(phrase, unquoted(phrase))
+
+
 def unquoted(phrase: str) -> str:
     """A phrase without the quotes around it, if there are."""
     quoted = _QUOTED.fullmatch(phrase)
@@ -172,17 +177,18 @@ def read(phrase: str, taught: Collection[str] = ()) -> Reading:
     Args:
         taught: phrases that this scene was taught beside the table's.
     """
-    whole = Reading(phrase, unquoted(phrase), known=False)
+    as_it_stands = whole(phrase)
+    unknown = replace(as_it_stands, known=False)
     plain = " ".join(phrase.lower().replace("\u2019", "'").rstrip(".!?").split())
     if _QUOTED.fullmatch(phrase) or re.search(r"(?:^|\s)[+-](?:\s|$)", plain):
-        return replace(whole, known=True)
+        return as_it_stands
     known = _names() | {each.lower() for each in taught}
     if not plain or plain in known:
-        return replace(whole, known=True)
+        return as_it_stands
     if len(plain.split()) > _MOST_WORDS or (denies(plain) and not _looks(plain.split()[1:2])):
-        return whole
+        return unknown
     found = _phrase(plain, known)
-    return whole if found is None or not (found.known or found.modifiers) else replace(found, phrase=phrase)
+    return unknown if found is None or not (found.known or found.modifiers) else replace(found, phrase=phrase)
 
 
 def _phrase(plain: str, known: Collection[str]) -> Reading | None:

@@ -55,6 +55,10 @@ class Sight:
     likely: float
     parts: Callable[[Bool[np.ndarray, " n"]], Int[np.ndarray, " n"]] = field(repr=False)
 
+    def asked(self, relevance: Mapping[str, Float[np.ndarray, " n"]], limit: float, least: float) -> "Sight":
+        """The same, asked this."""
+        return replace(self, relevance=relevance, limit=limit, likely=least)
+
     def things(self, head: str, limit: float) -> list[Thing]:
         """What is connected and answers a head, as large as an answer has to be."""
         return self.cut(head, self.relevance[head] >= limit)

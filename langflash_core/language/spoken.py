@@ -5,6 +5,7 @@ from dataclasses import replace
 
 from langflash_core.errors import PromptError
 from langflash_core.language.grammar import Reading, read
+from langflash_core.language.hints import hints
 from langflash_core.language.relevance import CompiledQuery, Mode, compile_query
 from langflash_core.language.spaces import LanguageSpace, encode_cached
 from langflash_core.language.vocabulary import OWN
@@ -42,6 +43,25 @@ def compile_spoken(
     named = tuple(dict.fromkeys(head for reading in readings for head in reading.heads[1:]))
     others = compile_query(scene, space, named, negatives=negatives, mode=mode) if named else None
     return replace(compiled, texts=told, notes=notes, readings=readings, others=others)
+
+
+def told(scene: Scene | Semantics, prompts: Sequence[str], *, narrowing: bool = True) -> tuple[str, ...]:
+    """What people should know of phrases before they are answered, or "".
+
+    Args:
+        narrowing: whether what answers them chooses among what answers their heads.
+    """
+    taught = tuple(scene.record.atom_names.values()) if isinstance(scene, Scene) else ()
+    readings = [read(prompt, taught) for prompt in prompts]
+    said = hints(scene, [reading.head for reading in readings])
+    return tuple(
+        "; ".join(filter(None, (hint, _unread(reading), "" if narrowing else _widened(reading))))
+        for reading, hint in zip(readings, said, strict=True)
+    )
+
+
+def _widened(reading: Reading) -> str:
+    return f'this shows every "{reading.head}", not only "{reading}"' if reading.narrows else ""
 
 
 def _unread(reading: Reading) -> str:
