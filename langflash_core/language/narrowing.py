@@ -13,7 +13,7 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import torch
 from jaxtyping import Bool, Float, Int
-from scipy.ndimage import distance_transform_edt, uniform_filter
+from scipy.ndimage import distance_transform_edt, maximum_filter, minimum_filter, uniform_filter
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 from torch import Tensor
@@ -281,7 +281,8 @@ class _View:
         return Sight(self.points, self.colours, areas, relevance, limit, least, self.parts)
 
     def parts(self, members: Bool[np.ndarray, " n"]) -> Int[np.ndarray, " n"]:
-        """Numbers of what is connected in the grid, -1 of others; neighbours are up to eight."""
+        """Numbers of what is connected in the grid, -1 of others; neighbours are up to eight. Edges, where
+        depths are between those of two things, are none where something is as thick as three."""
         inside = np.zeros(self.shown.shape, bool)
         inside[self.shown] = members
         numbers = np.arange(inside.size).reshape(inside.shape)
@@ -294,7 +295,11 @@ class _View:
         pairs = np.concatenate(starts), np.concatenate(ends)
         graph = coo_matrix((np.ones(len(pairs[0]), bool), pairs), shape=(inside.size, inside.size))
         found = connected_components(graph, directed=False)[1].reshape(inside.shape)
-        return np.where(inside, found, -1)[self.shown].astype(np.int64)
+        numbers = np.where(inside, found, -1)
+        thick = numbers[(minimum_filter(numbers, 3) == maximum_filter(numbers, 3)) & inside]
+        if len(thick):
+            numbers = np.where(np.isin(numbers, thick), numbers, -1)
+        return numbers[self.shown].astype(np.int64)
 
     def spread(self, choice: Choice) -> Bool[Tensor, "H W"]:
         """Pixels whose nearest thing in the picture is one that is meant."""
