@@ -32,6 +32,7 @@ _MOSTLY = (
 )
 _HARDLY = 0.6  # of the look's best thing: less is another look
 _MOST_COLOURFUL, _GREY = 0.98, 4.0  # quantile of chroma, and chroma: below, a picture is a grey one
+_CRUMB = 0.05  # of the share of the largest thing: the same chair four times as far away has 0.06
 _EVEN = 0.5  # relevancy of what fits no better than what it is compared with
 _LIKELY = 0.6  # of the way from there to the threshold: so sure must a related thing be where none is surer
 _COSINE = 0.8  # of the threshold, likewise
@@ -140,6 +141,7 @@ def _others(reading: Reading, sight: Sight) -> list[Thing]:
 
 def _measuring(things: list[Thing], modifier: Modifier, sight: Sight, head: str) -> Chosen:
     """Those that are most so; of several that are meant, those on that half of the scale."""
+    things = _seen_well(things)
     values = np.array([_MEASURES[modifier.word](each) for each in things])
     if modifier.word == "middle":
         values = -abs(values - (values.min() + values.max()) / 2)
@@ -147,6 +149,12 @@ def _measuring(things: list[Thing], modifier: Modifier, sight: Sight, head: str)
         values = -values
     enough = values.max() if modifier.most else (values.min() + values.max()) / 2
     return [each for each, value in zip(things, values, strict=True) if value >= enough], ""
+
+
+def _seen_well(things: list[Thing]) -> list[Thing]:
+    """Without crumbs, which no comparison is about."""
+    most = max(each.share for each in things)
+    return [each for each in things if each.share >= _CRUMB * most]
 
 
 _MEASURES: dict[str, Callable[[Thing], float]] = {
@@ -167,7 +175,7 @@ _MEASURES: dict[str, Callable[[Thing], float]] = {
 
 
 def _ordering(things: list[Thing], modifier: Modifier, sight: Sight, head: str) -> Chosen:
-    ranked = sorted(things, key=_MEASURES[modifier.word], reverse=True)
+    ranked = sorted(_seen_well(things), key=_MEASURES[modifier.word], reverse=True)
     place = modifier.number - 1 if modifier.number > 0 else len(ranked) - 1
     if place < len(ranked):
         return [ranked[place]], ""

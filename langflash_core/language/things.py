@@ -188,8 +188,8 @@ def _under(thing: Thing, other: Thing) -> bool:
 def _beside(thing: Thing, other: Thing) -> bool:
     """Near it, at about its height, and neither on top of it nor under it."""
     near = max(_BESIDE * min(thing.extent, other.extent), thing.touch)
-    levels = thing.middle[UP] <= other.high[UP] and other.low[UP] <= thing.middle[UP] + thing.sizes[UP]
-    return bool(levels) and gap(thing, [other]) <= near
+    apart = max(thing.low[UP] - other.high[UP], other.low[UP] - thing.high[UP])
+    return bool(apart <= -thing.touch / 2) and gap(thing, [other]) <= near
 
 
 def _inside(thing: Thing, other: Thing) -> bool:
