@@ -31,7 +31,7 @@ _FURTHER = frozenset(
     bar_stool bean_bag toilet_seat tool_box door_handle rocking_chair folding_chair office_chair cash_register
     vending_machine sewing_machine ping_pong_table side_table end_table work_bench filing_cabinet power_strip
     extension_cord first_aid_kit water_dispenser microphone loudspeaker basketball football globe map skirting
-    cutting_board chopping_board napkin candle_holder rack shelf_unit backrest
+    cutting_board chopping_board napkin candle_holder rack shelf_unit backrest wooden_floor
     """.split()  # noqa: SIM905
 )
 """Names of things that the table lacks, `_` for a space: the text model knows them, networks were not taught
@@ -264,6 +264,9 @@ def _noun(plain: str, known: Collection[str]) -> Reading | None:
     for start in range(len(words)):
         head = _single(" ".join(words[start:]), known)
         if head is not None:
+            while start and _single(words[start - 1], known) and not _adjective(words[start - 1], True):
+                start -= 1  # "floor lamp": a name of two
+                head = f"{words[start]} {head}"
             modifiers, ignored = _described(words[:start], _plural(words[-1], known))
             return Reading(plain, head, True, modifiers, ignored)
     kept = 0

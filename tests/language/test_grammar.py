@@ -151,6 +151,10 @@ def test_a_head_that_nobody_knows_is_told_apart() -> None:
     assert not read("typewriter").known and read("chair").known and read('"typewriter"').known
 
 
+def test_two_names_in_a_row_are_one() -> None:
+    assert read("floor lamp").whole and str(read("white island lamp")) == "island lamp, white"
+
+
 def test_words_that_a_person_taught_are_heads() -> None:
     assert str(read("white stuhl", ["Stuhl"])) == "stuhl, white" and read("stuhl", ["Stuhl"]).known
     assert read("spider-man pillow", ["spider-man pillow"]).whole
