@@ -15,11 +15,13 @@ from langflash_core.export.html import Beside, Phrases, TextModel, write_html
 from langflash_core.images.decode import grey_photo
 from langflash_core.images.lens import Intrinsics
 from langflash_core.language.answers import answer
-from langflash_core.language.gaussians import gaussian_relevance
 from langflash_core.language.minilm import load_minilm, shipped_files
-from langflash_core.language.relevance import Mode, compile_query, finite_dictionary, relevance_maps
+from langflash_core.language.narrowing import narrow_view
+from langflash_core.language.relevance import Mode, finite_dictionary, relevance_maps
 from langflash_core.language.spaces import language_space
+from langflash_core.language.spoken import compile_spoken
 from langflash_core.language.vocabulary import all_phrases
+from langflash_core.meant import meant_relevance
 from langflash_core.network import choose_pair
 from langflash_core.reconstruction.networks import Networks as Networks
 from langflash_core.reconstruction.stages import STAGES as STAGES
@@ -29,6 +31,7 @@ from langflash_core.resources import asset_path
 from langflash_core.running import Progress, Run
 from langflash_core.scene.exposure import lit_camera
 from langflash_core.scene.tour import Note, Stop, read_tour
+from langflash_core.scene.world import upward
 from langflash_core.splat import render as render_reference
 from langflash_core.splat.compose import some_layers
 from langflash_core.types import Camera, Frame, QueryResult, Scene
@@ -155,12 +158,18 @@ def query(
     chosen = _camera(scene, view, camera, size)
     phrases = [prompts] if isinstance(prompts, str) else list(prompts)
     space = language_space(scene.semantics.space)
-    compiled = compile_query(scene, space, phrases, negatives=negatives, mode=mode)
+    compiled = compile_spoken(scene, space, phrases, negatives=negatives, mode=mode)
     with torch.no_grad():
         frame = (render or render_reference)(scene, chosen)
         if frame.weight_maps is None:
             raise ValueError("render: expected a frame with weight maps, received one without")
         relevance = relevance_maps(frame.weight_maps, compiled)
+        if compiled.narrows:
+            others = None if compiled.others is None else relevance_maps(frame.weight_maps, compiled.others)
+            limits = [compiled.threshold if threshold is None else threshold] * len(phrases)
+            relevance, compiled = narrow_view(
+                compiled, relevance, others, frame, chosen, upward(scene.record.world), limits
+            )
         return answer(relevance, frame, chosen, compiled, threshold)
 
 
@@ -174,10 +183,10 @@ def select(scene: Scene, prompts: Sequence[str], *, threshold: float | None = No
         PromptError: a prompt or the threshold cannot be used, or no Gaussian passes.
         WeightsError: the language space has no text weights.
     """
-    compiled = compile_query(scene, language_space(scene.semantics.space), list(prompts))
+    compiled = compile_spoken(scene, language_space(scene.semantics.space), list(prompts))
     limit = compiled.threshold if threshold is None else threshold
     _check_threshold(limit)
-    best = gaussian_relevance(scene.semantics, compiled).amax(0)  # (N,)
+    best = meant_relevance(scene, compiled, [limit] * len(prompts))[0].amax(0)  # (N,)
     passing = best >= limit if scene.semantics.num_atoms else torch.zeros_like(best, dtype=torch.bool)
     if not bool(passing.any()):
         asked, highest = ", ".join(prompts), float(best.max()) if len(best) else 0.0
@@ -260,7 +269,7 @@ def _page_phrases(
     Raises:
         PromptError: a text or the threshold cannot be used.
     """
-    compiled = compile_query(scene, language_space(scene.semantics.space), list(texts))
+    compiled = compile_spoken(scene, language_space(scene.semantics.space), list(texts))  # of heads alone
     limit = compiled.threshold if threshold is None else threshold
     _check_threshold(limit)
     atoms = compiled.factor  # of which D = atoms Q: products with phrases are the same

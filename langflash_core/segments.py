@@ -25,9 +25,9 @@ from langflash_core.language.answers import (
     TOP_FRACTION,
     oriented_box,
 )
-from langflash_core.language.gaussians import gaussian_relevance
-from langflash_core.language.relevance import compile_query
 from langflash_core.language.spaces import language_space
+from langflash_core.language.spoken import compile_spoken
+from langflash_core.meant import meant_relevance
 from langflash_core.scene.instances import disc_radii, things
 from langflash_core.scene.thin import covered_areas
 from langflash_core.splat.visibility import seen_shares
@@ -51,11 +51,11 @@ def segment(scene: Scene, prompts: Sequence[str], *, threshold: float | None = N
     Raises:
         PromptError: a prompt or the threshold cannot be used. WeightsError: the space has no text weights.
     """
-    compiled = compile_query(scene, language_space(scene.semantics.space), list(prompts))
+    compiled = compile_spoken(scene, language_space(scene.semantics.space), list(prompts))
     limit = compiled.threshold if threshold is None else threshold
     if not 0 <= limit <= 1:
         raise PromptError(f"the threshold {limit} is out of range; relevancy needs 0 to 1")
-    relevance = gaussian_relevance(scene.semantics, compiled)  # (P, N)
+    relevance, _ = meant_relevance(scene, compiled, [limit] * len(prompts))  # (P, N)
     members = ((relevance >= limit) & (scene.semantics.num_atoms > 0)).cpu()
     shares = photo_shares(scene)  # (V, N)
     numbers = torch.stack([connected_things(scene, row, shares) for row in members])

@@ -381,7 +381,8 @@ class PromptAnswer:
 
     score: the value compared with `threshold` to decide `found`. area: fraction of pixels in
     the mask. centroid, box (center, axes (3, 3) rows, size): scene units, None when not found. note: for
-    people, where the phrase may not mean what was written; "" for most.
+    people, where the phrase may not mean what was written; "" for most. reading: how the phrase was
+    understood, head first ("chair, white"); "" where it was asked as it stands.
     """
 
     prompt: str
@@ -392,6 +393,7 @@ class PromptAnswer:
     centroid: tuple[float, float, float] | None
     box: dict | None
     note: str = ""
+    reading: str = ""
 
 
 @dataclass(frozen=True)

@@ -28,8 +28,8 @@ def open_scene(path: Path, axes: str | None = None) -> Scene:
     return scene
 
 
-def say_hints(scene: Scene, phrases: Sequence[str]) -> None:
-    """What people should know of phrases that a scene is asked, on stderr."""
-    from langflash_core.language.hints import hints
+def say_hints(scene: Scene, phrases: Sequence[str], *, narrowing: bool = True) -> None:
+    """What people should know of phrases that a scene is asked, on stderr; narrowing: as `told`."""
+    from langflash_core.language.spoken import told
 
-    say_warnings(hint for hint in dict.fromkeys(hints(scene, phrases)) if hint)
+    say_warnings(hint for hint in dict.fromkeys(told(scene, phrases, narrowing=narrowing)) if hint)

@@ -11,6 +11,8 @@ programs live as long as the context (canvas.py).
 """
 
 from dataclasses import replace
+from itertools import count
+from typing import NamedTuple
 
 import moderngl
 import numpy as np
@@ -41,6 +43,14 @@ from .scene import LiveScene, MakeSplats, Thinned
 from .splats import SplatBuffers
 from .targets import context_lives, read
 from .view import ViewTargets
+
+_names = count(1)
+
+
+class _Answered(NamedTuple):
+    picture: Picture
+    answer: Answer
+    threshold: float
 
 
 class SplatRenderer:
@@ -85,6 +95,7 @@ class SplatRenderer:
         self._scene: LiveScene | None = None
         self._question: Question | None = None
         self._picture: Picture | None = None
+        self._narrowed: tuple[tuple, np.ndarray, int] | None = None  # of which answer, what, and its name
 
     # --- what to draw -----------------------------------------------------------------------
 
@@ -297,11 +308,37 @@ class SplatRenderer:
         Raises:
             ValueError: nothing was asked or drawn.
         """
-        _, answer, _ = self._answered()
+        answer = self._asked().answer
         width, height, num_layers = answer.layers.array.size
         values = read(answer.layers.array).reshape(num_layers, height, width, PHRASES_A_LAYER)
         maps = np.moveaxis(values, -1, 1).reshape(-1, height, width)
         return torch.from_numpy(maps[: answer.num_phrases].copy())
+
+    def relevance_of(self, compiled: CompiledQuery) -> Tensor:
+        """As `relevance`, of phrases that are not asked beside.
+
+        Raises:
+            as `ask` and `relevance`.
+        """
+        asked = self._question
+        try:
+            self.ask(compiled)
+            return self.relevance()
+        finally:
+            self._question = asked
+
+    def narrow(self, relevance: Tensor) -> None:
+        """Show this relevance (P, H, W) of the phrases instead of their own, as long as this picture and this
+        question stay.
+
+        Raises:
+            ValueError: nothing was asked or drawn, or the size is another.
+        """
+        picture, answer, _ = self._asked()
+        expected = (answer.num_phrases, *reversed(picture.view.size))
+        if tuple(relevance.shape) != expected:
+            raise ValueError(f"relevance: expected {expected}, received {tuple(relevance.shape)}")
+        self._narrowed = answer.key, relevance.float().numpy(), next(_names)
 
     def labels(self, threshold: float | None = None) -> Tensor:
         """The best prompt per pixel (H, W) int64, -1 for none."""
@@ -483,12 +520,21 @@ class SplatRenderer:
         picture.lay()
         return picture
 
-    def _answered(self) -> tuple[Picture, Answer, float]:
+    def _answered(self) -> "_Answered":
+        """As `_asked`, narrowed where that was told."""
+        asked = self._asked()
+        if self._narrowed is None or self._narrowed[0] != asked.answer.key:
+            return asked
+        key, relevance, name = self._narrowed
+        layers = asked.picture.view.narrowed(name, relevance)
+        return asked._replace(answer=Answer(layers, asked.answer.num_phrases, (*key, name)))
+
+    def _asked(self) -> "_Answered":
         """The picture, the answer over it, and the threshold that the question brings along."""
         picture, question = self._drawn(), self._question
         if question is None:
             raise ValueError("relevance: expected ask(...) before, received no query")
-        return picture, picture.answer(question), question.compiled.threshold
+        return _Answered(picture, picture.answer(question), question.compiled.threshold)
 
     # --- the end ------------------------------------------------------------------------------
 

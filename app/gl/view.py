@@ -46,6 +46,8 @@ class ViewTargets:
         self._blend: Blend | None = None
         self._told = Layers(painter.ctx, size, "f4")
         self._tells = (0, 0)  # picture and question of `_told`
+        self._narrowed = Layers(painter.ctx, size, "f4")
+        self._narrows = 0  # what `_narrowed` holds
 
     def draw_colour(self, level: Prepared) -> None:
         """Colour and depth of the level as it stands, unless they are there."""
@@ -110,13 +112,24 @@ class ViewTargets:
         """Relevance (P, H, W) that is made elsewhere, of the picture so named, unless it is there."""
         told = self._told.exactly(num_groups(question.num_phrases))
         if (key, question.key) != self._tells:
-            width, height = self.size
-            texels = np.zeros((told.num_layers, height, width, PHRASES_A_LAYER), np.float32)
-            for phrase, values in enumerate(make()):
-                texels[phrase // PHRASES_A_LAYER, :, :, phrase % PHRASES_A_LAYER] = values
-            told.array.write(texels)
+            self._lay(make(), told)
             self._tells = key, question.key
         return told
+
+    def narrowed(self, name: int, relevance: np.ndarray) -> LayerTarget:
+        """Relevance (P, H, W) so named, in place of what the picture answers, unless it is there."""
+        narrowed = self._narrowed.exactly(num_groups(len(relevance)))
+        if name != self._narrows:
+            self._lay(relevance, narrowed)
+            self._narrows = name
+        return narrowed
+
+    def _lay(self, relevance: np.ndarray, into: LayerTarget) -> None:
+        width, height = self.size
+        texels = np.zeros((into.num_layers, height, width, PHRASES_A_LAYER), np.float32)
+        for phrase, values in enumerate(relevance):
+            texels[phrase // PHRASES_A_LAYER, :, :, phrase % PHRASES_A_LAYER] = values
+        into.array.write(texels)
 
     def exact(self, question: Question, level: Prepared) -> LayerTarget:
         """Relevance from the weight maps, which are drawn unless they are there."""
@@ -177,5 +190,5 @@ class ViewTargets:
         if self._blend is not None:
             self._blend.release()
         self._blend = None
-        for owned in (self._told, self.display, self.packed, self.maps, self.colour):
+        for owned in (self._narrowed, self._told, self.display, self.packed, self.maps, self.colour):
             owned.release()

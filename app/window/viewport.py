@@ -28,6 +28,8 @@ from .scene.memory import SceneMemory
 from .state import State
 
 if TYPE_CHECKING:
+    from torch import Tensor
+
     from langflash_core.language.relevance import CompiledQuery
     from langflash_core.types import Scene
 
@@ -274,6 +276,11 @@ class Viewport:
     def view(self, state: State) -> View | None:
         """The resting view to score, once per picture and query; None when there is nothing new."""
         return None if self.picture is None else self.picture.view(state, self._stand)
+
+    def narrow(self, name: tuple, relevance: "Tensor") -> None:
+        """Show this relevance (P, H, W) of the phrases, if the view of that name (`View.name`) is on show."""
+        if self.picture is not None:
+            self.picture.easel.narrow(name, relevance)
 
     @property
     def settling(self) -> bool:

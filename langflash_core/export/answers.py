@@ -92,6 +92,7 @@ def answer_fields(answer: PromptAnswer, scale: float) -> dict[str, Any]:
         "centroid": answer.centroid and [scale * value for value in answer.centroid],
         "box": answer.box and scaled_box(answer.box, scale),
         "note": answer.note,
+        "reading": answer.reading,
     }
 
 

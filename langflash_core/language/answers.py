@@ -62,6 +62,9 @@ def answer(
     )
     if compiled.notes:
         answers = tuple(replace(one, note=note) for one, note in zip(answers, compiled.notes, strict=True))
+    if compiled.readings:
+        read = ("" if reading.whole else str(reading) for reading in compiled.readings)
+        answers = tuple(replace(one, reading=text) for one, text in zip(answers, read, strict=True))
     return QueryResult(answers, compiled.mode, relevance, masks, frame, camera)
 
 

@@ -88,9 +88,25 @@ def _negated(plain: str) -> str:
             f'write what you look for, a minus and what it is not, as in "{more} - {less}"'
         )
     if beside := _BESIDE.fullmatch(plain):
-        more = re.sub(rf"^{_ARTICLE}", "", beside["more"])
-        return f'"{beside["word"]}" takes nothing away; write "{more} - {beside["less"]}"'
+        return f'"{beside["word"]}" takes nothing away; write "{_more(beside)} - {beside["less"]}"'
     return ""
+
+
+def denies(plain: str) -> bool:
+    """Whether a phrase says what something is not, and nothing else; "no smoking sign" is a thing."""
+    return bool(_ALONE.fullmatch(plain) or (_SIGNS.search(plain) and plain.startswith("no ")))
+
+
+def taken_away(plain: str) -> tuple[str, str] | None:
+    """What a negation leaves, and what it takes away from that; None where there is none, or nothing else."""
+    if _SIGNS.search(plain) or _ALONE.fullmatch(plain):
+        return None
+    beside = _BESIDE.fullmatch(plain)
+    return None if beside is None else (_more(beside), beside["less"])
+
+
+def _more(beside: re.Match[str]) -> str:
+    return re.sub(rf"^{_ARTICLE}", "", beside["more"])
 
 
 def _misspelt(plain: str, own: frozenset[str]) -> str:

@@ -18,6 +18,7 @@ from torch import Tensor
 
 from langflash_core.errors import PromptError, SceneFileError
 from langflash_core.language.algebra import encode_prompts
+from langflash_core.language.grammar import Reading
 from langflash_core.language.hints import hints
 from langflash_core.language.spaces import LanguageSpace, encode_cached
 from langflash_core.language.taught import taught_dictionary
@@ -38,7 +39,9 @@ class CompiledQuery:
 
     factor: R (K, r). prompts: Q t (P, r). negatives: Q n (M, r), M = 0 in cosine mode.
     temperature > 0. threshold: from which relevance a phrase counts as present. texts,
-    negative_texts: the phrases. notes: what people should know of each, or "" (`hints.py`).
+    negative_texts: the phrases. notes: what people should know of each, or "" (`hints.py`). readings: of
+    phrases whose heads alone were compiled; none: they are asked as they stand. others: heads of the things
+    that they are related to.
     """
 
     factor: Float[Tensor, "K r"]
@@ -50,6 +53,13 @@ class CompiledQuery:
     texts: tuple[str, ...]
     negative_texts: tuple[str, ...] = ()
     notes: tuple[str, ...] = ()
+    readings: tuple[Reading, ...] = ()
+    others: "CompiledQuery | None" = None
+
+    @property
+    def narrows(self) -> bool:
+        """Whether some phrase chooses among what answers its head (`narrowing.py`)."""
+        return any(reading.narrows for reading in self.readings)
 
 
 @dataclass(frozen=True)

@@ -13,9 +13,9 @@ from jaxtyping import Bool, Float
 from langflash_core.errors import InputError, PromptError
 from langflash_core.geometry.cameras import invert_rigid
 from langflash_core.geometry.harmonics import SH_C0
-from langflash_core.language.gaussians import gaussian_relevance
-from langflash_core.language.relevance import compile_query
 from langflash_core.language.spaces import language_space
+from langflash_core.language.spoken import compile_spoken
+from langflash_core.meant import meant_relevance
 from langflash_core.scene.instances import disc_radii
 from langflash_core.scene.joining import appended
 from langflash_core.splat.visibility import seen_shares
@@ -99,9 +99,9 @@ def answering(
     Raises:
         PromptError: none does, or a phrase cannot be used. WeightsError: the space has no text weights.
     """
-    compiled = compile_query(scene, language_space(scene.semantics.space), list(phrases))
+    compiled = compile_spoken(scene, language_space(scene.semantics.space), list(phrases))
     limit = compiled.threshold if threshold is None else threshold
-    best = gaussian_relevance(scene.semantics, compiled).amax(0)
+    best = meant_relevance(scene, compiled, [limit] * len(phrases))[0].amax(0)
     found = (best >= limit).cpu().numpy() & (scene.semantics.num_atoms > 0)
     if not found.any():
         highest = float(best.max()) if len(best) else 0.0

@@ -59,6 +59,11 @@ def turn_of(world: World) -> Float[np.ndarray, "3 3"]:
     return rotations.matrix(world.turn)
 
 
+def upward(world: World | None) -> Float[np.ndarray, " 3"]:
+    """Unit vector that points up, in the scene's axes; as the first photo was held, where nobody knows."""
+    return np.array([0.0, -1.0, 0.0]) if world is None else -turn_of(world)[1]
+
+
 def _turned(gaussians: Gaussians, means: Tensor, matrix: Tensor, unit: float) -> Gaussians:
     """At these means, turned and scaled."""
     quats = torch.nn.functional.normalize(turned_quats(gaussians.quats, matrix), dim=-1)

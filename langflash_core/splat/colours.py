@@ -110,9 +110,10 @@ class _Drawn:
 
 def _narrowed(matrix: scipy.sparse.csr_matrix) -> tuple[np.ndarray, scipy.sparse.csr_matrix]:
     """Which columns of a matrix are not empty, and the matrix of these."""
-    used = np.zeros(matrix.shape[1], bool)
+    rows, columns = matrix.get_shape()
+    used = np.zeros(columns, bool)
     used[matrix.indices] = True
     places = (np.cumsum(used, dtype=np.int32) - 1).astype(np.int32)
     seen = np.flatnonzero(used)
     parts = (matrix.data, places[matrix.indices], matrix.indptr)
-    return seen, scipy.sparse.csr_matrix(parts, shape=(matrix.shape[0], len(seen)))
+    return seen, scipy.sparse.csr_matrix(parts, shape=(rows, len(seen)))

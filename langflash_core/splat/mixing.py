@@ -17,6 +17,7 @@ from itertools import pairwise
 
 import numpy as np
 import scipy.sparse
+from jaxtyping import Bool
 
 from langflash_core.splat.projection import ALPHA_MAX, Footprints
 from langflash_core.types import Camera
@@ -42,18 +43,22 @@ def mixing(
     count: int,
     faint: float = FAINT,
     small: float = SMALL,
+    wanted: Bool[np.ndarray, "H W"] | None = None,
 ) -> scipy.sparse.csr_matrix:
     """Contributions (H*W, N) float32 of N Gaussians to the pixels of a view, row by row, front to back.
 
     Args:
         footprints: of the Gaussians as the camera sees them. count: N.
         faint, small: alpha and contribution below which a pair is left out; 1/255 and 0 as in pictures.
+        wanted: (H, W) bool, pixels whose rows are asked for, the others' are empty; None: all.
     """
     table = _Table.of(footprints, camera, faint)
     light = np.zeros(camera.width * camera.height)  # logarithm of what passes all slabs so far
+    if wanted is not None:
+        light[~wanted.ravel()] = -np.inf
     layers = []
     for rows in np.array_split(np.arange(len(table.sides)), _slabs(len(table.sides))):
-        clear = light >= math.log(max(small, 1e-30)) if small > 0 and layers else None
+        clear = light >= math.log(max(small, 1e-30)) if wanted is not None or (small > 0 and layers) else None
         if clear is not None:
             rows = rows[table.seen(rows, clear.reshape(camera.height, camera.width))]
         alphas, pixels, starts = _pairs(table, rows, camera, faint, clear)

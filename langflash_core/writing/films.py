@@ -32,8 +32,9 @@ from langflash_core.geometry.poses import (
 )
 from langflash_core.geometry.reach import median_reach
 from langflash_core.geometry.tours import RATE, along, even
-from langflash_core.language.relevance import CompiledQuery, compile_query
+from langflash_core.language.relevance import CompiledQuery
 from langflash_core.language.spaces import language_space
+from langflash_core.language.spoken import compile_spoken
 from langflash_core.limits import TEXT
 from langflash_core.running import Progress
 from langflash_core.scene.exposure import lit_camera
@@ -83,12 +84,12 @@ def write_film(job: Job) -> str:
 
 
 def asked(scene: Scene, phrase: str, threshold: float | None) -> CompiledQuery:
-    """What a heat-map is of.
+    """What a heat-map is of: the head of a phrase (`language/grammar.py`).
 
     Raises:
         PromptError: the phrase cannot be used.
     """
-    compiled = compile_query(scene, language_space(scene.semantics.space), [phrase])
+    compiled = compile_spoken(scene, language_space(scene.semantics.space), [phrase])
     return compiled if threshold is None else replace(compiled, threshold=threshold)
 
 

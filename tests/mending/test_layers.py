@@ -15,9 +15,7 @@ def screened() -> tuple[Scene, torch.Tensor]:
     """A screen before a wall, a layer a photo; and which Gaussians are the screen's."""
     made = photographed(2)
     scene = coloured_scene(
-        covered_scene(
-            made.prediction, made.views, DETAILS["normal"], gaussians=None, preset="mini", layered=True
-        )
+        covered_scene(made.prediction, made.views, DETAILS["normal"], gaussians=None, preset="mini")
     )
     assert scene.layered
     unit = float(scene.gaussians.means[:, 2].quantile(0.9)) / WALL

@@ -249,3 +249,16 @@ def test_slabs_by_depth_change_nothing(monkeypatch, small):
     # Sums of logs begin elsewhere, in float64: the last digit of float32.
     np.testing.assert_allclose(parts.data, whole.data, rtol=1e-6)
     assert small == 0 or sum(looked_at) < 0.7 * len(footprints.ids)
+
+
+@pytest.mark.parametrize("small", [0.0, SMALL])
+def test_rows_that_are_not_wanted_are_empty_and_the_others_the_same(small):
+    gaussians, seen = cloud(400, size=0.05).gaussians, camera()
+    footprints = project(gaussians, seen)
+    wanted = np.zeros((seen.height, seen.width), bool)
+    wanted[5:20, 3:30] = True
+    whole = mixing(footprints, seen, 400, small=small)
+    some = mixing(footprints, seen, 400, small=small, wanted=wanted)
+    assert some[~wanted.ravel()].nnz == 0 and some.nnz > 0
+    assert (some[wanted.ravel()] != whole[wanted.ravel()]).nnz == 0
+    assert mixing(footprints, seen, 400, wanted=np.zeros_like(wanted)).nnz == 0

@@ -7,6 +7,7 @@ from typing import TextIO
 
 from langflash_core.errors import SceneFileError
 from langflash_core.files import readable_file
+from langflash_core.outputs import output_of
 from langflash_core.request import ExportRequest, spoken
 
 from ..report import ProgressBar
@@ -29,10 +30,16 @@ def run(args: Namespace, out: TextIO) -> None:
     for path in (args.scene, *args.beside):
         readable_file(path, "scene", SceneFileError)
     scene = open_scene(args.scene, request.axes_of(args.scene))
-    say_hints(scene, request.prompts)
+    say_hints(scene, request.prompts, narrowing=_narrows(request))
     with ProgressBar() as progress:
         said = write(scene, request, renderers=partial(open_renderer, args.backend), progress=progress)
     print(f"{args.output}: {said}", file=out)
+
+
+def _narrows(request: ExportRequest) -> bool:
+    """Whether what is written holds what phrases mean; pages and films of heat-maps know heads alone."""
+    kind = output_of(request.output, request.what, bool(request.prompts))
+    return kind is None or not (kind.subject == "page" or (kind.moves and kind.colours))
 
 
 def request_of(args: Namespace) -> ExportRequest:

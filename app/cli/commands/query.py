@@ -70,7 +70,10 @@ def _one_scene(
 
 def _line(entry: dict[str, Any], unit: str) -> str:
     found = "found    " if entry["found"] else "not found"
-    line = f"{found}  {entry['prompt']}: score {entry['score']:.3f} (threshold {entry['threshold']:.3f})"
+    read = f" (read as: {entry['reading']})" if entry["reading"] else ""
+    line = (
+        f"{found}  {entry['prompt']}{read}: score {entry['score']:.3f} (threshold {entry['threshold']:.3f})"
+    )
     if entry["found"]:
         where = ", ".join(f"{value:.2f}" for value in entry["centroid"])
         line += f", {entry['area']:.1%} of the picture, at ({where}) {'m' if unit == 'm' else 'scene units'}"

@@ -13,6 +13,8 @@ from .prompt_sets import MOST_PROMPTS, PromptSet
 from .state import LEAST_SPAN, MOST_RECENT, PALETTE, Histogram, Insight, Prompt
 
 if TYPE_CHECKING:
+    from torch import Tensor
+
     from langflash_core.language.relevance import CompiledQuery
 
 
@@ -93,7 +95,9 @@ class EditPrompt:
     text: str
 
     def apply(self, state: State) -> State:
-        after = _change_prompt(state, self.key, text=self.text, score=None, like=b"", place=None, note="")
+        after = _change_prompt(
+            state, self.key, text=self.text, score=None, like=b"", place=None, note="", reading=""
+        )
         first = not state.asking.asked and bool(after.asking.asked)
         mode = pictures.HEAT if first and state.scene.mode is pictures.RGB else after.scene.mode
         return after.with_scene(mode=mode).with_asking(active=self.key).with_asking(named=False)
@@ -276,6 +280,38 @@ class Answered:
 
 
 @dataclass(frozen=True)
+class Narrowed:
+    """Relevance (P, H, W) of the view so named, of what the phrases mean alone. notes: (key, text, note)
+    of the phrases that choose. lapses: as of `Answered`."""
+
+    name: tuple = field(repr=False)
+    relevance: "Tensor" = field(compare=False, repr=False)
+    notes: tuple[tuple[int, str, str], ...] = ()
+    lapses: int = 0
+
+    def apply(self, state: State) -> State:
+        if self.lapses != state.asking.lapses:
+            return state
+        current = {p.key: p.text.strip() for p in state.asking.prompts}
+        for key, text, note in self.notes:
+            if current.get(key) == text:
+                state = _change_prompt(state, key, note=note)
+        return state
+
+
+@dataclass(frozen=True)
+class AskWhole:
+    """A phrase is asked as it stands: within quotes."""
+
+    key: int
+
+    def apply(self, state: State) -> State:
+        text = next((p.text for p in state.asking.prompts if p.key == self.key), "")
+        plain = text.replace('"', "").strip()
+        return EditPrompt(self.key, f'"{plain}"').apply(state) if plain else state
+
+
+@dataclass(frozen=True)
 class Calibrated:
     """The threshold that the scene and its language space were calibrated to."""
 
@@ -290,17 +326,21 @@ class Calibrated:
 @dataclass(frozen=True)
 class PhrasesCompiled:
     """The phrases `keys`, in the order of `query`, are ready to be asked. lapses: as `Asking.lapses` was.
-    notes: on each, or "" (`langflash_core/language/hints.py`)."""
+    notes: on each, or "" (`langflash_core/language/hints.py`). readings: of each, "" where it is asked as it
+    stands (`langflash_core/language/grammar.py`).
+    """
 
     keys: tuple[int, ...]
     query: "CompiledQuery" = field(compare=False, repr=False)
     lapses: int = 0
     notes: tuple[str, ...] = ()
+    readings: tuple[str, ...] = ()
 
     def apply(self, state: State) -> State:
         state = Calibrated(self.query.threshold).apply(state)
-        for key, note in zip(self.keys, self.notes or repeat(""), strict=False):
-            state = _change_prompt(state, key, note=note)
+        told = zip(self.keys, self.notes or repeat(""), self.readings or repeat(""), strict=False)
+        for key, note, reading in told:
+            state = _change_prompt(state, key, note=note, reading=reading)
         return state if state.asking.negatives else state.with_asking(usual=self.query.negative_texts)
 
 

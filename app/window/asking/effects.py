@@ -7,7 +7,7 @@ from ..scene.commands import SceneArrived
 from ..scene.mended import SplitPart
 from ..state import State
 from ..viewport import Viewport
-from .commands import EditPrompt, LoadPrompts, PhrasesCompiled, SavePrompts, SetNegatives
+from .commands import EditPrompt, LoadPrompts, Narrowed, PhrasesCompiled, SavePrompts, SetNegatives
 from .parting import TakePartAt, TakePartOut, at_point, divided, own_atom
 from .prompt_sets import PromptSet
 from .work import Answer, DescribeAtoms, Encode, ListParts, ReadPrompts, WeighAtoms, WritePrompts
@@ -67,6 +67,8 @@ class AskingEffects(Effects):
                 submit(ReadPrompts(path))
             case PhrasesCompiled(keys, query, lapses):
                 self._viewport.ask(keys, query, lapses)
+            case Narrowed(name, relevance):
+                self._viewport.narrow(name, relevance)
             case TakePartOut(text, part) if state.scene.job is not None and own_atom(before, part) is None:
                 info, marks = state.scene.info, state.editing.marks
                 if info is not None and marks is not None:
@@ -113,7 +115,8 @@ class AskingEffects(Effects):
         view = self._viewport.view(state)
         if view is not None:
             seen = (view.relevance, view.frame, view.camera, view.query)
-            self._hands.submit(Answer(view.serial, view.keys, *seen, view.lapses))
+            chosen = (view.others, view.up, view.cuts, view.name)
+            self._hands.submit(Answer(view.serial, view.keys, *seen, view.lapses, *chosen))
 
 
 def _answer(state: State) -> tuple | None:

@@ -34,7 +34,8 @@ class Prompt:
 
     threshold: the person's own, or None for the calibrated one. calibrated: what None means.
     like: a language vector as float32 bytes that is asked instead of the words. place: where in the scene it
-    fits best. note: what a person should know of its words, or "".
+    fits best. note: what a person should know of its words, or "". reading: how they are understood,
+    or "" where they are asked as they stand.
     """
 
     key: int
@@ -47,6 +48,7 @@ class Prompt:
     like: bytes = field(default=b"", repr=False)
     place: Vector | None = None
     note: str = ""
+    reading: str = ""
 
     @property
     def found(self) -> bool | None:

@@ -2,7 +2,7 @@
 atoms. Heavy imports wait until they are needed."""
 
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from itertools import repeat
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -16,7 +16,7 @@ from langflash_core.scene.mask import Mask
 from ..commands import Command, Notify, ShowPicture
 from ..requests import Asked, Errand, SceneErrand
 from ..scene.memory import SceneMemory
-from .commands import Answered, AtomsDescribed, AtomsWeighed, Binned, PhrasesCompiled, PromptsRead
+from .commands import Answered, AtomsDescribed, AtomsWeighed, Binned, Narrowed, PhrasesCompiled, PromptsRead
 from .parting import PartsListed
 from .prompt_sets import PromptSet, read_prompts, write_prompts
 from .state import BINS, Histogram, Insight, Part, Parts
@@ -47,19 +47,28 @@ class Encode(SceneErrand):
     lapses: int = 0
 
     def run(self, stopping: Asked) -> Iterator[Command]:
-        from langflash_core.language.relevance import compile_query, spoken_dictionary
+        from langflash_core.language.grammar import whole
+        from langflash_core.language.relevance import spoken_dictionary
         from langflash_core.language.spaces import language_space
+        from langflash_core.language.spoken import compile_spoken
         from langflash_core.language.words import with_vectors
         from langflash_core.scene.edited import spoken_scene
 
         scene = self.scene if self.marks is None else spoken_scene(self.scene, self.marks)
         space = language_space(scene.semantics.space)
-        query = compile_query(scene, space, list(self.texts), negatives=list(self.negatives) or None)
+        query = compile_spoken(scene, space, list(self.texts), negatives=list(self.negatives) or None)
         likes = {row: _vector(like) for row, like in enumerate(self.likes) if like}
         query = with_vectors(query, spoken_dictionary(scene, space), likes)
+        if likes:
+            readings = (
+                whole(text) if row in likes else read
+                for row, (text, read) in enumerate(zip(query.texts, query.readings, strict=True))
+            )
+            query = replace(query, readings=tuple(readings))
         noted = zip(query.notes, self.likes or repeat(b""), strict=False)
         notes = tuple("" if like else note for note, like in noted)
-        yield PhrasesCompiled(self.keys, query, self.lapses, notes)
+        readings = tuple("" if reading.whole else str(reading) for reading in query.readings)
+        yield PhrasesCompiled(self.keys, query, self.lapses, notes, readings)
 
 
 def _vector(content: bytes) -> "Tensor":
@@ -70,7 +79,10 @@ def _vector(content: bytes) -> "Tensor":
 
 @dataclass(frozen=True)
 class Answer(SceneErrand):
-    """Score phrases in one view, and count how its pixels score."""
+    """Score phrases in one view, of what they mean alone, and count how its pixels score.
+
+    others, up, cuts, name: as `View` of app/window/drawing/values.py.
+    """
 
     newest_counts = True
 
@@ -80,25 +92,42 @@ class Answer(SceneErrand):
     camera: "Camera"
     query: "CompiledQuery"
     lapses: int = 0
+    others: "Tensor | None" = None
+    up: tuple[float, ...] = (0.0, -1.0, 0.0)
+    cuts: tuple[float, ...] = ()
+    name: tuple = ()
 
     def run(self, stopping: Asked) -> Iterator[Command]:
         from langflash_core.language.answers import answer, best_places
 
-        result = answer(self.relevance, self.frame, self.camera, self.query)
+        relevance, query = self.relevance, self.query
+        if query.narrows:
+            relevance, query = self._narrowed()
+            choosing = zip(self.keys, query.texts, query.notes, query.readings, strict=True)
+            notes = tuple((key, text, note) for key, text, note, reading in choosing if reading.narrows)
+            yield Narrowed(self.name, relevance, notes, self.lapses)
+        result = answer(relevance, self.frame, self.camera, query)
         answers = zip(self.keys, result.answers, strict=True)
         scores = tuple((key, a.prompt, float(a.score)) for key, a in answers)
-        places = best_places(self.relevance, self.frame, self.camera)
+        places = best_places(relevance, self.frame, self.camera)
         yield Answered(scores, self.lapses, tuple(p and Vector(*p) for p in places))
-        yield Binned(self.histograms(), self.lapses)
+        yield Binned(self.histograms(relevance), self.lapses)
 
-    def histograms(self) -> tuple[Histogram, ...]:
+    def _narrowed(self) -> "tuple[Tensor, CompiledQuery]":
+        from langflash_core.language.narrowing import narrow_view
+
+        limits = self.cuts or (self.query.threshold,) * len(self.keys)
+        up = np.array(self.up)
+        return narrow_view(self.query, self.relevance, self.others, self.frame, self.camera, up, limits)
+
+    def histograms(self, relevance: "Tensor") -> tuple[Histogram, ...]:
         """How many covered pixels of the view score how high, by phrase."""
         from langflash_core.language.answers import COVERED_ALPHA
 
         covered = self.frame.alphas >= COVERED_ALPHA
         made = []
-        for key, text, relevance in zip(self.keys, self.query.texts, self.relevance, strict=True):
-            counts, _ = np.histogram(relevance[covered].numpy(), BINS, (0.0, 1.0))
+        for key, text, own in zip(self.keys, self.query.texts, relevance, strict=True):
+            counts, _ = np.histogram(own[covered].numpy(), BINS, (0.0, 1.0))
             made.append(Histogram(key, text, tuple(int(n) for n in counts)))
         return tuple(made)
 
@@ -120,17 +149,17 @@ class ListParts(SceneErrand):
         import torch
 
         from langflash_core.inventory.things import kinds_of
-        from langflash_core.language.gaussians import gaussian_relevance
-        from langflash_core.language.relevance import compile_query
         from langflash_core.language.spaces import language_space
+        from langflash_core.language.spoken import compile_spoken
+        from langflash_core.meant import meant_relevance
         from langflash_core.scene.edited import left, spoken_scene
         from langflash_core.segments import photo_shares
 
         marks, memory = self.marks, self.memory
         scene = left(spoken_scene(memory.changed(marks), marks), marks)
         space = language_space(scene.semantics.space)
-        compiled = compile_query(scene, space, [self.text], negatives=list(self.negatives) or None)
-        relevance = gaussian_relevance(scene.semantics, compiled)[0].cpu()
+        compiled = compile_spoken(scene, space, [self.text], negatives=list(self.negatives) or None)
+        relevance = meant_relevance(scene, compiled, [self.cut])[0][0].cpu()
         members = (relevance >= self.cut).numpy()
         where = (marks.left, marks.changes)
         shares = memory.answered("photo shares", where, lambda: photo_shares(scene))

@@ -9,13 +9,11 @@ from ..governor import Governor
 from ..state import State
 from .easel import Easel
 from .marked import Marked
-from .values import Stand, View, kind_of
+from .values import Numbers, Stand, View, kind_of
 
 if TYPE_CHECKING:
-    from torch import Tensor
-
     from langflash_core.language.relevance import CompiledQuery
-    from langflash_core.types import Frame, Scene
+    from langflash_core.types import Scene
 
 
 class CardPicture:
@@ -53,8 +51,8 @@ class CardPicture:
     def view(self, state: State, stand: Stand) -> View | None:
         return self.easel.view(state, stand, self._numbers)
 
-    def _numbers(self) -> "tuple[Frame, Tensor]":
-        return self.easel.renderer.frame(), self.easel.renderer.relevance()
+    def _numbers(self) -> Numbers:
+        return self.easel.numbers()
 
     @property
     def whole(self) -> bool:

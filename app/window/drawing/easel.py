@@ -12,6 +12,7 @@ from langflash_core import pictures
 from langflash_core.geometry.poses import to_camera
 from langflash_core.pictures import Picture
 from langflash_core.scene.exposure import PlaceLight
+from langflash_core.scene.world import upward
 
 from ...gl import SplatRenderer
 from ...gl.paints import PAINTS, Wanted
@@ -23,13 +24,13 @@ from ..scene.near import fills_gaps, keeps_near
 from ..scene.state import possible
 from ..state import State
 from .marked import Marked
-from .values import BACKGROUND, Asked, Drawn, Stand, View, kind_of
+from .values import BACKGROUND, Asked, Drawn, Numbers, Stand, View, kind_of
 
 if TYPE_CHECKING:
     from torch import Tensor
 
     from langflash_core.language.relevance import CompiledQuery
-    from langflash_core.types import Camera, Frame, Scene
+    from langflash_core.types import Camera, Scene
 
     from ...gl.processor.still import Still
 
@@ -59,6 +60,7 @@ class Easel:
         renderer.ask(None)
         self.renderer = renderer
         self._light = PlaceLight.of(scene)
+        self._up = tuple(upward(scene.record.world).tolist())
         self.drawn: Drawn | None = None
         self.camera: Camera | None = None
         self.seconds = 0.0
@@ -195,12 +197,10 @@ class Easel:
         point = _place(self.camera, x, y, depth)
         return Reading(at, point, depth, None if weights is None else strongest(weights)), weights
 
-    def view(
-        self, state: State, stand: Stand, numbers: "Callable[[], tuple[Frame, Tensor] | None]"
-    ) -> View | None:
+    def view(self, state: State, stand: Stand, numbers: Callable[[], Numbers | None]) -> View | None:
         """The resting view to score, once per picture and query; None when there is nothing new.
 
-        numbers: frame and relevance of what is on show, None while they are not there.
+        numbers: of what is on show, None while they are not there.
         """
         drawn, asked, camera = self.drawn, self.asked, self.camera
         if asked.query is None or drawn is None or camera is None:
@@ -211,12 +211,38 @@ class Easel:
             return None  # the query that holds now is on its way
         if drawn != self.wanted(state, stand, drawn.plan):
             return None  # and so is the picture
-        name = (drawn, asked.number)
+        shown = {prompt.key: prompt.cut for prompt in state.asking.prompts}
+        cuts = tuple(shown.get(key, asked.query.threshold) for key in asked.keys)
+        name = (drawn, asked.number, cuts if asked.query.narrows else ())
         found = None if name == self._scored else numbers()
         if found is None:
             return None
         self._scored = name
-        return View(drawn.serial, asked.keys, *found, camera, asked.query, asked.lapses)
+        return View(
+            drawn.serial,
+            asked.keys,
+            found.frame,
+            found.relevance,
+            camera,
+            asked.query,
+            asked.lapses,
+            found.others,
+            self._up,
+            name,
+            cuts,
+        )
+
+    def numbers(self) -> Numbers:
+        """Of what the renderer drew."""
+        query, renderer = self.asked.query, self.renderer
+        others = None if query is None or query.others is None else renderer.relevance_of(query.others)
+        return Numbers(renderer.frame(), renderer.relevance(), others)
+
+    def narrow(self, name: tuple, relevance: "Tensor") -> None:
+        """Show this relevance (P, H, W), if the picture and the question of `View.name` are on show."""
+        if name == self._scored:
+            self.renderer.narrow(relevance)
+            self._painted = None
 
 
 def _place(camera: "Camera", x: int, y: int, depth: float) -> tuple[float, float, float]:

@@ -20,10 +20,11 @@ from ...gl.processor.still import Still, draw_still
 from ..governor import Kind
 from ..state import State
 from .easel import Easel
-from .values import Drawn
+from .values import Drawn, Numbers
 
 if TYPE_CHECKING:
-    from langflash_core.types import Frame, Scene
+    from langflash_core.language.relevance import CompiledQuery
+    from langflash_core.types import Scene
 
 SCALES = (0.5, 1.0)
 """Of the still pictures that follow each other. Of a scene of layers the smaller ones have as few as what
@@ -95,14 +96,16 @@ class Stills:
         """Whether what is on show needs no long work for what is asked."""
         return self.shown is None or self._tells(self.shown, state)
 
-    def numbers(self, state: State) -> "tuple[Frame, torch.Tensor] | None":
-        """Frame and relevance of what is on show; None while that is not there."""
-        query, renderer = self._easel.asked.query, self._easel.renderer
+    def numbers(self, state: State) -> Numbers | None:
+        """Of what is on show; None while they are not there."""
+        query = self._easel.asked.query
         if not self.ready(state) or query is None:
             return None
         if self.shown is None or self.shown.maps is None:
-            return renderer.frame(), renderer.relevance()
-        return self.shown.frame, torch.from_numpy(self.shown.maps.relevance(query))
+            return self._easel.numbers()
+        maps = self.shown.maps
+        others = None if query.others is None else torch.from_numpy(maps.relevance(query.others))
+        return Numbers(self.shown.frame, torch.from_numpy(maps.relevance(query)), others)
 
     # --- what is ordered --------------------------------------------------------------------
 
@@ -166,8 +169,8 @@ class Stills:
 
         def ask(still: Still) -> None:
             if still.maps is not None:
-                if query is not None:
-                    still.maps.relevance(query)
+                for asked in _both(query):
+                    still.maps.relevance(asked)
                 if columns is not None:
                     still.maps.mixed(columns)
             _ = still.frame
@@ -179,8 +182,13 @@ class Stills:
         query = self._easel.asked.query
         if still.maps is None:
             return True
-        if query is not None and not still.maps.answers(query):
+        if not all(still.maps.answers(asked) for asked in _both(query)):
             return False
         if not state.scene.mode.columns:
             return True
         return still.maps.mixes(self._easel.renderer.columns(state.scene.mode.columns == "features"))
+
+
+def _both(query: "CompiledQuery | None") -> "list[CompiledQuery]":
+    """A question, and that of the things that its phrases relate their heads to."""
+    return [each for each in (query, query and query.others) if each is not None]

@@ -60,7 +60,10 @@ class Asked:
 
 @dataclass(frozen=True)
 class View:
-    """A picture at rest, read back for the worker to score. lapses: as `Asking.lapses` is."""
+    """A picture at rest, read back for the worker to score. lapses: as `Asking.lapses` is. others: relevance
+    (R, H, W) of what the phrases relate their heads to. up: of the scene, a unit vector. name: of the picture
+    and the question; cuts: thresholds in force.
+    """
 
     serial: int
     keys: tuple[int, ...]
@@ -69,6 +72,19 @@ class View:
     camera: "Camera"
     query: "CompiledQuery"
     lapses: int
+    others: "Tensor | None" = None
+    up: tuple[float, ...] = (0.0, -1.0, 0.0)
+    name: tuple = ()
+    cuts: tuple[float, ...] = ()
+
+
+@dataclass(frozen=True)
+class Numbers:
+    """Of a picture at rest: its frame, relevance (P, H, W), and as `View.others`."""
+
+    frame: "Frame"
+    relevance: "Tensor"
+    others: "Tensor | None" = None
 
 
 def kind_of(state: State) -> Kind:

@@ -199,19 +199,22 @@ class FindByPhrase(Selection):
         """(N,) bool: Gaussians whose own relevance reaches the threshold."""
         import torch
 
-        from langflash_core.language.gaussians import gaussian_relevance
         from langflash_core.language.relevance import compile_query, spoken_dictionary
         from langflash_core.language.spaces import language_space
+        from langflash_core.language.spoken import compile_spoken
         from langflash_core.language.words import with_vectors
+        from langflash_core.meant import meant_relevance
 
         scene = self.spoken()
-        space = language_space(scene.semantics.space)
-        query = compile_query(scene, space, [self.text], negatives=list(self.negatives) or None)
+        space, negatives = language_space(scene.semantics.space), list(self.negatives) or None
         if self.like:
+            query = compile_query(scene, space, [self.text], negatives=negatives)
             vector = torch.from_numpy(np.frombuffer(self.like, np.float32).copy())
             query = with_vectors(query, spoken_dictionary(scene, space), {0: vector})
+        else:
+            query = compile_spoken(scene, space, [self.text], negatives=negatives)
         least = query.threshold if self.threshold is None else self.threshold
-        return (gaussian_relevance(scene.semantics, query)[0] >= least).numpy()
+        return (meant_relevance(scene, query, [least])[0][0] >= least).numpy()
 
 
 @dataclass(frozen=True)

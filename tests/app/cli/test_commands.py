@@ -94,7 +94,8 @@ def test_query_for_people(run, scene_file, tmp_path):
     first, second = outcome.out.splitlines()
     assert first.startswith("found") and "armchair" in first and "armchair_heat.png" in first
     assert second.startswith("not found") and "submarine" in second
-    assert outcome.err == ""  # no bar, no warning
+    told = '"submarine" is no thing that this model was taught; it knows none that is near'
+    assert outcome.err == f"warning: {told}\n"  # no bar, no other warning
 
 
 def test_what_a_phrase_may_not_mean_is_said(run, scene_file, tmp_path):
@@ -125,6 +126,21 @@ def test_what_a_phrase_may_not_mean_is_said(run, scene_file, tmp_path):
     ):
         outcome = run(*command)
         assert outcome.code == 0 and said[0] in outcome.err.splitlines(), (command, outcome.err)
+
+
+def test_query_tells_how_it_reads_a_phrase(run, scene_file, tmp_path):
+    """The armchair of the stripes is pink."""
+    asked = ("pink armchair", "blue armchair", "leather armchair", '"pink armchair"', "armchair")
+    outcome = run("query", scene_file, *asked, "-o", tmp_path / "a", *TORCH)
+    pink, blue, leather, quoted, plain = outcome.out.splitlines()
+    assert pink.startswith("found      pink armchair (read as: armchair, pink): score 0.9")
+    assert blue.startswith("not found  blue armchair (read as: armchair, blue): score 0.0")
+    assert "(read as: armchair)" in leather and "(read as" not in quoted + plain
+    assert '"leather" says nothing that can be checked here, so this is "armchair"' in outcome.err
+    assert "no armchair here looks blue" in outcome.err
+    document = run("query", scene_file, *asked, "-o", tmp_path / "b", "--json", *TORCH).json()
+    readings = [entry["reading"] for entry in document["prompts"]]
+    assert readings == ["armchair, pink", "armchair, blue", "armchair", "", ""]
 
 
 def test_query_by_cosine_with_own_negatives(run, scene_file, tmp_path):

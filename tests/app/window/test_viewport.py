@@ -9,6 +9,8 @@ import torch
 
 from app.gl.layered import LayeredLevel
 from app.gl.processor import still
+from app.window.asking.commands import Answered, Narrowed
+from app.window.asking.work import Answer
 from app.window.drawing.card import CardPicture
 from app.window.drawing.processor import ProcessorPicture
 from app.window.drawing.stills import RETRY_SECONDS
@@ -21,6 +23,7 @@ from langflash_core import pictures
 from langflash_core.geometry.poses import from_view, orbit
 from langflash_core.language.relevance import compile_query
 from langflash_core.language.spaces import language_space
+from langflash_core.language.spoken import compile_spoken
 from langflash_core.scene.edited import first_marks
 from langflash_core.scene.edits import History, delete
 from langflash_core.scene.exposure import lit_camera
@@ -409,3 +412,60 @@ def test_of_a_huge_scene_only_a_share_is_brought_to_opengl_on_the_processor(cont
         viewport.release()
     moved = {plan.share for plan in plans[:20] if plan is not None}
     assert moved == {share} and plans[-1] is not None and plans[-1].share == 1
+
+
+@pytest.mark.parametrize("picture", [ProcessorPicture, CardPicture])
+def test_what_a_phrase_does_not_mean_leaves_the_picture_and_no_splat_is_drawn(context, picture) -> None:
+    """The armchair is red and stands before the wall: by its colour and its place it is told from others."""
+    space = language_space("minilm")
+    shown = shown_scene()
+    assert shown.scene.info is not None
+    scene = room(space.encode(list(PHRASES)))
+    state = shown.with_scene(mode=pictures.HEAT, info=replace(shown.scene.info, scene=scene))
+    with context:
+        viewport = Viewport(context)
+        viewport.set_scene(1, scene)
+        if picture is CardPicture:
+            viewport.picture = CardPicture(viewport._made(), 1, scene)
+
+        def seen(phrase: str) -> tuple[Narrowed | None, Answered, np.ndarray]:
+            """The answer, and the picture once it is narrowed."""
+            nonlocal state
+            query = compile_spoken(scene, space, [phrase])
+            asked = replace(state.asking.prompts[0], text=phrase, calibrated=query.threshold)
+            state = state.with_asking(prompts=(asked,))
+            viewport.ask((asked.key,), query, state.asking.lapses)
+            view = None
+            for _ in range(600):
+                state = replace(state, now=state.now + 0.05)
+                viewport.update(state, SIZE, touched=0.0)
+                view = viewport.view(state) or view
+                whole = viewport.whole and not viewport.settling
+                if whole and view is not None and tuple(view.frame.alphas.shape) == SIZE[::-1]:
+                    break
+                time.sleep(0.01)
+            assert view is not None
+            parts = (view.relevance, view.frame, view.camera, view.query, view.lapses)
+            done = Answer(1, view.keys, *parts, view.others, view.up, view.cuts, view.name).run(lambda: False)
+            told = [each for each in done if isinstance(each, Narrowed | Answered)]
+            narrowed = next((each for each in told if isinstance(each, Narrowed)), None)
+            if narrowed is not None:
+                viewport.narrow(narrowed.name, narrowed.relevance)
+            viewport.update(state, SIZE, touched=0.0)
+            pixels = viewport.seen()
+            assert pixels is not None
+            return narrowed, next(each for each in told if isinstance(each, Answered)), pixels.astype(int)
+
+        _, _, plain = seen("armchair")
+        passes = dict(viewport.passes)
+        kept, _, red = seen("red armchair in front of the wall")
+        gone, none, blue = seen("blue armchair")
+        assert kept is not None and gone is not None and float(kept.relevance.max()) > 0.9
+        assert none.scores[0][2] == 0 and gone.notes[0][2] == "no armchair here looks blue"
+        assert abs(red - plain).max() <= 1 and abs(blue - plain).max() > 50, "a rounding; colours of heat"
+        again, _, whole = seen('"blue armchair"')
+        assert again is None and abs(whole - blue).max() > 50
+        after = dict(viewport.passes)
+        splatted = ("colour", "weights")
+        assert [after.get(kind) for kind in splatted] == [passes.get(kind) for kind in splatted]
+        viewport.release()

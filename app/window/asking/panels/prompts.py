@@ -128,10 +128,22 @@ def _verdict(prompt: Prompt, look: Look) -> list[do.Command]:
     if widgets.quiet_button(f"{fa.ICON_FA_ROTATE_LEFT}##calibrated", "Back to the calibrated threshold"):
         issued.append(ask.SetThreshold(prompt.key, None))
     imgui.end_disabled()
+    if prompt.reading:
+        issued += _reading(prompt, look)
     if prompt.note:
         widgets.muted(f"{prompt.note[:1].upper()}{prompt.note[1:]}.".replace("?.", "?"))
     imgui.unindent(look.px(36))
     return issued
+
+
+def _reading(prompt: Prompt, look: Look) -> list[do.Command]:
+    """How the words are understood; a click takes that away."""
+    tip = "Ask the phrase as it stands, within quotes"
+    away = widgets.quiet_button(f"{fa.ICON_FA_XMARK}##whole", tip)
+    imgui.same_line(0, look.px(4))
+    imgui.align_text_to_frame_padding()
+    widgets.muted(f"Read as: {prompt.reading}")
+    return [ask.AskWhole(prompt.key)] if away else []
 
 
 def _negatives(state: State) -> list[do.Command]:

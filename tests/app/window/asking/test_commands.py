@@ -18,6 +18,7 @@ from app.window.state import State
 from langflash_core import pictures
 from langflash_core.errors import PromptError
 from langflash_core.language.algebra import terms
+from langflash_core.language.grammar import read
 from langflash_core.pictures import PICTURES, margin_span
 from tests.app.window.scenes import after, room, shown_scene
 
@@ -187,3 +188,26 @@ def test_a_range_of_colours_is_kept_in_order_and_apart() -> None:
     low, high = after(state, ask.SetSpan((1.0, 1.0))).asking.span or (0, 0)
     assert 0 <= low < high <= 1.01
     assert after(state, ask.SetSpan(None)).heat_colours.ends(0.4)[0] < 0.4
+
+
+def test_a_reading_is_shown_until_the_words_change() -> None:
+    query: Any = SimpleNamespace(threshold=0.8, negative_texts=())
+    state = after(asked("white chair"), ask.PhrasesCompiled((0,), query, 0, ("",), ("chair, white",)))
+    assert state.asking.prompts[0].reading == "chair, white"
+    assert after(state, ask.EditPrompt(0, "white chairs")).asking.prompts[0].reading == ""
+
+
+def test_a_reading_that_is_taken_away_leaves_the_phrase_within_quotes() -> None:
+    state = after(asked(' the "white" chair '), ask.AskWhole(0))
+    assert state.asking.prompts[0].text == '"the white chair"' and read(state.asking.prompts[0].text).whole
+    empty = after(State(), ask.AskWhole(0), ask.AskWhole(99))
+    assert empty.asking.prompts == State().asking.prompts
+
+
+def test_what_a_view_says_of_a_reading_is_noted_with_its_phrase() -> None:
+    told: Any = {"name": (), "relevance": torch.zeros(1, 1, 1)}
+    state = after(asked("blue chair"), ask.Narrowed(**told, notes=((0, "blue chair", "none looks blue"),)))
+    assert state.asking.prompts[0].note == "none looks blue"
+    other = ask.Narrowed(**told, notes=((0, "red chair", "another"),))
+    lapsed = ask.Narrowed(**told, notes=((0, "blue chair", "late"),), lapses=7)
+    assert after(state, other, lapsed).asking.prompts[0].note == "none looks blue"

@@ -171,3 +171,12 @@ def test_a_new_phrase_has_the_caret_and_is_answered_in_any_mode(program: Program
     program.xdotool("type", "--delay", "60", "lamp")
     program.until(lambda s: s["prompts"][-1][0] == "lamp", "the phrase in its field")
     program.until(lambda s: s["prompts"][-1][1] is not None and s["mode"] == "rgb", "its score")
+
+
+def test_a_reading_stands_under_its_phrase_and_a_click_takes_it_away(program: Program) -> None:
+    type_into(program, 0, "blue armchair")
+    program.until(lambda s: s["prompts"][0][2] is False, "no armchair that looks blue")
+    program.click("##whole")
+    program.until(lambda s: s["prompts"][0][0] == '"blue armchair"', "the phrase within quotes")
+    state = program.until(lambda s: s["prompts"][0][2] is not None, "its answer")
+    assert not any(name.endswith("##whole") for name in state["items"])

@@ -1,0 +1,335 @@
+"""What a phrase says beside its head, decided among the things that answer the head.
+
+In a view everything is told by what it shows already, relevance, colour and depth of its pixels: no Gaussian
+is drawn for it. In every n-th pixel things are told apart (connected, without a jump of depth) and chosen
+from, and every pixel keeps its relevance, or loses it, with the thing that is nearest in the picture.
+
+P phrases, R heads of things that they are related to.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+
+import numpy as np
+import torch
+from jaxtyping import Bool, Float, Int
+from scipy.ndimage import distance_transform_edt, maximum_filter, minimum_filter, uniform_filter
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+from torch import Tensor
+
+from langflash_core.language.answers import COVERED_ALPHA, MIN_AREA, world_points
+from langflash_core.language.grammar import Modifier, Reading
+from langflash_core.language.looks import LOOKS, lab, looking, room_white
+from langflash_core.language.relevance import CompiledQuery
+from langflash_core.language.things import AWAY, UP, Thing, gap, related
+from langflash_core.types import Camera, Frame
+
+SIDE = 320  # pixels, about, of the longer side of the grid in which things are told apart
+_JUMP = 0.06  # of the nearer depth: neighbours that differ by more are of two things
+_MOSTLY = (
+    0.4  # of a thing's surface, from which on it is called by a look: the rest is shade and what lies on it
+)
+_HARDLY = 0.6  # of the look's best thing: less is another look
+_MOST_COLOURFUL, _GREY = 0.98, 4.0  # quantile of chroma, and chroma: below, a picture is a grey one
+_CRUMB = 0.05  # of the share of the largest thing: the same chair four times as far away has 0.06
+_EVEN = 0.5  # relevancy of what fits no better than what it is compared with
+_LIKELY = 0.6  # of the way from there to the threshold: so sure must a related thing be where none is surer
+_COSINE = 0.8  # of the threshold, likewise
+_UPRIGHT = 0.2  # length of the view's direction seen from above, below which it looks up or down
+
+
+@dataclass(frozen=True)
+class Sight:
+    """What there is to choose among: n pixels of a view, or n Gaussians of a scene.
+
+    points: (n, 3) in the viewer's axes (`things.py`). colours: (n, 3) CIELAB. areas: (n,) of the view or
+    of the surface, sum 1. relevance: (n,) by head. limit, likely: relevance from which on something is
+    there, or may be. parts: numbers (n,) of the connected parts of some members, -1 of others.
+    """
+
+    points: Float[np.ndarray, "n 3"]
+    colours: Float[np.ndarray, "n 3"]
+    areas: Float[np.ndarray, " n"]
+    relevance: Mapping[str, Float[np.ndarray, " n"]]
+    limit: float
+    likely: float
+    parts: Callable[[Bool[np.ndarray, " n"]], Int[np.ndarray, " n"]] = field(repr=False)
+
+    def asked(self, relevance: Mapping[str, Float[np.ndarray, " n"]], limit: float, least: float) -> "Sight":
+        """The same, asked this."""
+        return replace(self, relevance=relevance, limit=limit, likely=least)
+
+    def things(self, head: str, limit: float) -> list[Thing]:
+        """What is connected and answers a head, as large as an answer has to be."""
+        return self.cut(head, self.relevance[head] >= limit)
+
+    def cut(self, head: str, members: Bool[np.ndarray, " n"]) -> list[Thing]:
+        """The connected parts of some members."""
+        numbers = self.parts(members)
+        rows = np.flatnonzero(numbers >= 0)
+        order = rows[np.argsort(numbers[rows], kind="stable")]
+        found = []
+        for own in np.split(order, np.flatnonzero(np.diff(numbers[order])) + 1):
+            share = float(self.areas[own].sum())
+            if len(own) and share >= MIN_AREA:
+                found.append(Thing(own, self.points[own], share, float(self.relevance[head][own].mean())))
+        return found
+
+
+@dataclass(frozen=True)
+class Choice:
+    """The things that a reading means, those of its head that it does not, and what people should know."""
+
+    kept: list[Thing]
+    dropped: list[Thing]
+    note: str = ""
+
+
+def choose(reading: Reading, sight: Sight, limit: float | None = None) -> Choice:
+    """The things of a sight that a reading means. Looks come first, then relations, then what compares."""
+    things = sight.things(reading.head, sight.limit if limit is None else limit)
+    kept, notes = things, list[str]()
+    for kind in ("look", "relation", "size", "place", "order", "count"):
+        for modifier in reading.modifiers:
+            if kept and modifier.kind == kind:
+                kept, note = _CHOOSERS[kind](kept, modifier, sight, reading.head)
+                notes += [note] if note else []
+    left = {id(each) for each in kept}
+    return Choice(kept, [each for each in things if id(each) not in left], "; ".join(notes))
+
+
+Chosen = tuple[list[Thing], str]
+
+
+def _looking(things: list[Thing], modifier: Modifier, sight: Sight, head: str) -> Chosen:
+    """Things mostly called so; where none is, the parts of them that are."""
+    chroma = np.hypot(sight.colours[:, 1], sight.colours[:, 2])
+    if LOOKS[modifier.word].hue and np.quantile(chroma, _MOST_COLOURFUL) < _GREY:
+        return things, f"its picture has no colours, so nothing here can be told to be {modifier.word}"
+    well = [looking(sight.colours[each.rows], modifier.word) for each in things]
+    shares = np.array([float(each.mean()) for each in well])
+    if modifier.negated:
+        return [each for each, share in zip(things, shares, strict=True) if share < _MOSTLY], ""
+    enough = max(_MOSTLY, _HARDLY * float(shares.max()))
+    if shares.max() >= enough:
+        return [each for each, share in zip(things, shares, strict=True) if share >= enough], ""
+    members = np.zeros(len(sight.areas), bool)
+    for each, own in zip(things, well, strict=True):
+        members[each.rows[own >= 0.5]] = True
+    found = sight.cut(head, members)
+    return found, "" if found else f"no {head} here looks {modifier.word}"
+
+
+def _relating(things: list[Thing], modifier: Modifier, sight: Sight, head: str) -> Chosen:
+    others = [_others(other, sight) for other in modifier.others]
+    for other, found in zip(modifier.others, others, strict=True):
+        if not found:
+            return [], f'no "{other}" is found here, to which the phrase relates it'
+    if modifier.word in ("nearest to", "farthest from"):
+        sign = 1 if modifier.word == "nearest to" else -1
+        return [min(things, key=lambda each: sign * gap(each, others[0]))], ""
+    found = [each for each in things if related(each, modifier.word, others) != modifier.negated]
+    return found, "" if found else f"no {head} here is {modifier}"
+
+
+def _others(reading: Reading, sight: Sight) -> list[Thing]:
+    """Related things, less sure ones where there are no others."""
+    found = choose(reading, sight).kept
+    return found or choose(reading, sight, sight.likely).kept
+
+
+def _measuring(things: list[Thing], modifier: Modifier, sight: Sight, head: str) -> Chosen:
+    """Those that are most so; of several that are meant, those on that half of the scale."""
+    things = _seen_well(things)
+    values = np.array([_MEASURES[modifier.word](each) for each in things])
+    if modifier.word == "middle":
+        values = -abs(values - (values.min() + values.max()) / 2)
+    if modifier.negated:
+        values = -values
+    enough = values.max() if modifier.most else (values.min() + values.max()) / 2
+    return [each for each, value in zip(things, values, strict=True) if value >= enough], ""
+
+
+def _seen_well(things: list[Thing]) -> list[Thing]:
+    """Without crumbs, which no comparison is about."""
+    most = max(each.share for each in things)
+    return [each for each in things if each.share >= _CRUMB * most]
+
+
+_MEASURES: dict[str, Callable[[Thing], float]] = {
+    "big": lambda thing: float(np.sort(thing.sizes)[1:].prod()),
+    "small": lambda thing: -float(np.sort(thing.sizes)[1:].prod()),
+    "tall": lambda thing: float(thing.sizes[UP]),
+    "short": lambda thing: -float(thing.sizes[UP]),
+    "wide": lambda thing: float(np.hypot(thing.sizes[0], thing.sizes[AWAY])),
+    "narrow": lambda thing: -float(np.hypot(thing.sizes[0], thing.sizes[AWAY])),
+    "left": lambda thing: -thing.column,
+    "right": lambda thing: thing.column,
+    "middle": lambda thing: thing.column,
+    "upper": lambda thing: float(thing.middle[UP]),
+    "lower": lambda thing: -float(thing.middle[UP]),
+    "nearest": lambda thing: -thing.distance,
+    "farthest": lambda thing: thing.distance,
+}
+
+
+def _ordering(things: list[Thing], modifier: Modifier, sight: Sight, head: str) -> Chosen:
+    ranked = sorted(_seen_well(things), key=_MEASURES[modifier.word], reverse=True)
+    place = modifier.number - 1 if modifier.number > 0 else len(ranked) - 1
+    if place < len(ranked):
+        return [ranked[place]], ""
+    return [], f"only {len(ranked)} of them {'is' if len(ranked) == 1 else 'are'} seen here"
+
+
+def _counting(things: list[Thing], modifier: Modifier, sight: Sight, head: str) -> Chosen:
+    kept = sorted(things, key=lambda each: -each.share * each.sure)[: modifier.number]
+    return kept, "" if len(kept) == modifier.number else f"only {len(kept)} seen here"
+
+
+_CHOOSERS = {
+    "look": _looking,
+    "relation": _relating,
+    "size": _measuring,
+    "place": _measuring,
+    "order": _ordering,
+    "count": _counting,
+}
+
+
+def likely(limit: float, mode: str) -> float:
+    """Relevance from which on a related thing may be there."""
+    return _EVEN + _LIKELY * max(limit - _EVEN, 0.0) if mode == "relevancy" else _COSINE * limit
+
+
+def viewer_axes(viewmat: Float[Tensor, "4 4"], up: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3 3"]:
+    """Rows right, up, away of who looks with a camera, in the world; up is a unit vector of the world."""
+    rotation = viewmat[:3, :3].double().cpu().numpy()
+    ahead, above = rotation[2], -rotation[1]
+    level = ahead - (ahead @ up) * up
+    if np.linalg.norm(level) < _UPRIGHT:  # from above: what is above in the picture is away
+        level = np.sign(-(ahead @ up)) * (above - (above @ up) * up)
+    away = level / max(float(np.linalg.norm(level)), 1e-9)
+    return np.stack((np.cross(away, up), up, away))
+
+
+def narrow_view(
+    compiled: CompiledQuery,
+    relevance: Float[Tensor, "P H W"],
+    others: Float[Tensor, "R H W"] | None,
+    frame: Frame,
+    camera: Camera,
+    up: Float[np.ndarray, "3"],
+    limits: Sequence[float],
+) -> tuple[Float[Tensor, "P H W"], CompiledQuery]:
+    """Relevance of phrases, 0 where it belongs to things that they do not mean; the query with notes of that.
+
+    Args:
+        relevance: by the phrases' heads. others: of `compiled.others`.
+        frame: of the view, as `camera` sees it. up: unit vector of the world. limits: thresholds (P,).
+    """
+    narrowed, notes = relevance.clone(), []
+    view = _View.of(frame, camera, up)
+    named = (
+        {}
+        if others is None or compiled.others is None
+        else dict(zip(compiled.others.texts, others, strict=True))
+    )
+    related_to = {head: view.picked(own) for head, own in named.items()}
+    told = compiled.notes or ("",) * len(limits)
+    for row, (reading, limit) in enumerate(zip(compiled.readings, limits, strict=True)):
+        note = ""
+        if reading.narrows:
+            by_head = {**related_to, reading.head: view.picked(relevance[row])}
+            choice = choose(reading, view.sight(by_head, limit, likely(limit, compiled.mode)))
+            note = choice.note
+            if choice.dropped:
+                narrowed[row] *= view.spread(choice).to(narrowed)
+        notes.append("; ".join(filter(None, (told[row], note))))
+    return narrowed, replace(compiled, notes=tuple(notes))
+
+
+@dataclass(frozen=True)
+class _View:
+    """A grid (h, w) of every `step`-th pixel of a view (H, W), and the n of them that show the scene."""
+
+    size: tuple[int, int]
+    step: int
+    depths: Float[np.ndarray, "h w"]
+    shown: Bool[np.ndarray, "h w"]
+    points: Float[np.ndarray, "n 3"]
+    colours: Float[np.ndarray, "n 3"]
+
+    @staticmethod
+    def of(frame: Frame, camera: Camera, up: Float[np.ndarray, "3"]) -> "_View":
+        height, width = frame.alphas.shape
+        step = max(1, round(max(height, width) / SIDE))
+        some = slice(step // 2, None, step)
+        shown = (frame.alphas >= COVERED_ALPHA).cpu().numpy()[some, some]
+        axes = viewer_axes(camera.viewmat, up)
+        eye = camera.viewmat.double().inverse()[:3, 3].cpu().numpy()
+        places = world_points(frame.depths.double().cpu(), camera).numpy()[some, some][shown]
+        straight = frame.rgb.cpu() / frame.alphas.cpu().clamp_min(COVERED_ALPHA)[..., None]
+        rgb = uniform_filter(straight.numpy(), step + 2, axes=(0, 1))[some, some][shown]
+        return _View(
+            (height, width),
+            step,
+            frame.depths.double().cpu().numpy()[some, some],
+            shown,
+            (places - eye) @ axes.T,
+            lab(rgb, room_white(rgb)),
+        )
+
+    def picked(self, values: Float[Tensor, "H W"]) -> Float[np.ndarray, " n"]:
+        some = slice(self.step // 2, None, self.step)
+        return values.cpu().numpy()[some, some][self.shown]
+
+    def sight(self, relevance: Mapping[str, np.ndarray], limit: float, least: float) -> Sight:
+        areas = np.full(len(self.points), 1 / self.shown.size)
+        return Sight(self.points, self.colours, areas, relevance, limit, least, self.parts)
+
+    def parts(self, members: Bool[np.ndarray, " n"]) -> Int[np.ndarray, " n"]:
+        """Numbers of what is connected in the grid, -1 of others; neighbours are up to eight. Edges, where
+        depths are between those of two things, are none where something is as thick as three."""
+        inside = np.zeros(self.shown.shape, bool)
+        inside[self.shown] = members
+        numbers = np.arange(inside.size).reshape(inside.shape)
+        starts, ends = list[np.ndarray](), list[np.ndarray]()
+        for one, two in _NEIGHBOURS:
+            near, far = self.depths[one], self.depths[two]
+            tied = inside[one] & inside[two] & (abs(near - far) <= _JUMP * np.minimum(near, far))
+            starts.append(numbers[one][tied])
+            ends.append(numbers[two][tied])
+        pairs = np.concatenate(starts), np.concatenate(ends)
+        graph = coo_matrix((np.ones(len(pairs[0]), bool), pairs), shape=(inside.size, inside.size))
+        found = connected_components(graph, directed=False)[1].reshape(inside.shape)
+        numbers = np.where(inside, found, -1)
+        thick = numbers[(minimum_filter(numbers, 3) == maximum_filter(numbers, 3)) & inside]
+        if len(thick):
+            numbers = np.where(np.isin(numbers, thick), numbers, -1)
+        return numbers[self.shown].astype(np.int64)
+
+    def spread(self, choice: Choice) -> Bool[Tensor, "H W"]:
+        """Pixels whose nearest thing in the picture is one that is meant."""
+        owner = np.zeros(self.shown.shape, np.int8)
+        flat = np.zeros(len(self.points), np.int8)
+        for value, things in ((1, choice.dropped), (2, choice.kept)):  # parts of a thing go before the thing
+            for each in things:
+                flat[each.rows] = value
+        owner[self.shown] = flat
+        nearest = np.asarray(distance_transform_edt(owner == 0, return_distances=False, return_indices=True))
+        kept = torch.from_numpy(owner[nearest[0], nearest[1]] == 2)
+        fine = kept.repeat_interleave(self.step, 0).repeat_interleave(self.step, 1)
+        rows, columns = (
+            torch.arange(side).clamp_max(own - 1) for side, own in zip(self.size, fine.shape, strict=True)
+        )
+        return fine[rows][:, columns]
+
+
+_ALL, _FROM, _TO = slice(None), slice(1, None), slice(None, -1)
+_NEIGHBOURS = (
+    ((_ALL, _TO), (_ALL, _FROM)),
+    ((_TO, _ALL), (_FROM, _ALL)),
+    ((_TO, _TO), (_FROM, _FROM)),
+    ((_TO, _FROM), (_FROM, _TO)),
+)

@@ -1,0 +1,234 @@
+"""Things in front of somebody who looks, and how they stand to each other.
+
+Points are in the viewer's axes: right, up (against gravity), away; the eye is at 0. "Left of", "in front of"
+and "nearest" are as the viewer has them, "above", "under" and "on" as gravity has.
+"""
+
+from dataclasses import dataclass, replace
+from functools import cached_property
+
+import numpy as np
+from jaxtyping import Float, Integer
+from scipy.spatial import KDTree
+
+RIGHT, UP, AWAY = 0, 1, 2
+_ENDS = (0.05, 0.95)  # quantiles of points that are a thing's ends: edges bleed in depth
+_TOUCH = 0.04  # of the distance from the eye: depth of photos is as wrong, and edges are as far from pixels
+_BESIDE = 0.5  # of the smaller thing's size: how far things stand from each other that are beside each other
+_LEVEL = 0.75  # cosine with up from which a surface carries what stands on it
+_FLAT = 0.1  # of the spread of points around a place: thinner is a plane
+_HANGING = 0.3  # of the distance from the eye: of a lamp below its ceiling
+_MEETS = 0.3  # of the narrower of two things: so much of it the other covers, or is covered by it
+_LEFT = 0.2  # of a thing, below which it is the same as what covers the rest
+_MOST_POINTS = 800  # of a thing
+_MOST_OF_ALL = 4000  # of all that something is related to
+
+
+@dataclass(frozen=True)
+class Thing:
+    """What is connected and answers one word.
+
+    rows: pixels or Gaussians that it is made of. places: of them, (m, 3), m >= 1, viewer's axes. share: of
+    the view, or of the scene's surface. sure: relevance.
+    """
+
+    rows: Integer[np.ndarray, " m"]
+    places: Float[np.ndarray, "m 3"]
+    share: float = 0.0
+    sure: float = 1.0
+
+    @cached_property
+    def points(self) -> Float[np.ndarray, "n 3"]:
+        """Some of its places."""
+        return self.places[:: max(1, len(self.places) // _MOST_POINTS)]
+
+    def without(self, other: "Thing") -> "Thing | None":
+        """What is left of it where another thing is not; None of what is mostly the other."""
+        left = ~np.isin(self.rows, other.rows)
+        if left.all():
+            return self
+        return replace(self, rows=self.rows[left], places=self.places[left]) if left.mean() >= _LEFT else None
+
+    @cached_property
+    def low(self) -> Float[np.ndarray, "3"]:
+        return np.quantile(self.points, _ENDS[0], axis=0)
+
+    @cached_property
+    def high(self) -> Float[np.ndarray, "3"]:
+        return np.quantile(self.points, _ENDS[1], axis=0)
+
+    @cached_property
+    def middle(self) -> Float[np.ndarray, "3"]:
+        return (self.low + self.high) / 2
+
+    @cached_property
+    def sizes(self) -> Float[np.ndarray, "3"]:
+        return self.high - self.low
+
+    @cached_property
+    def extent(self) -> float:
+        """Its longest side."""
+        return float(max(self.sizes.max(), 1e-9))
+
+    @cached_property
+    def distance(self) -> float:
+        """From the eye."""
+        return float(np.linalg.norm(self.middle))
+
+    @cached_property
+    def columns(self) -> tuple[float, float]:
+        """Directions of its ends, radians to the right."""
+        angles = np.arctan2(self.points[:, RIGHT], self.points[:, AWAY])
+        low, high = np.quantile(angles, _ENDS)
+        return float(low), float(high)
+
+    @property
+    def column(self) -> float:
+        """Of its middle."""
+        return sum(self.columns) / 2
+
+    @property
+    def touch(self) -> float:
+        """How near something is that touches it."""
+        return _TOUCH * self.distance
+
+
+def together(things: list[Thing]) -> Float[np.ndarray, "n 3"]:
+    """Some places of several things."""
+    places = np.concatenate([each.places for each in things])
+    return places[:: max(1, len(places) // _MOST_OF_ALL)]
+
+
+def related(thing: Thing, relation: str, others: list[list[Thing]]) -> bool:
+    """Whether a thing stands in a relation of the grammar's to some of these.
+
+    Args:
+        others: the things of each word that the relation names, at least one of each; two words, or one of
+            several things, for "between". "nearest to" and "farthest from" compare things: see `gap`.
+    """
+    apart = [[other.without(thing) for other in some] for some in others]
+    others = [[other for other in some if other is not None] for some in apart]
+    if not all(others):
+        return False
+    if relation == "between":
+        first, last = others[0], others[-1]
+        return any(_between(thing, one, two) for one in first for two in last if one is not two)
+    if relation == "on":
+        return _on(thing, together(others[0]))
+    if relation == "with":
+        return gap(thing, others[0]) <= thing.touch
+    return any(_PAIRS[relation](thing, other) for other in others[0])
+
+
+def gap(thing: Thing, others: list[Thing]) -> float:
+    """Distance from a thing's points to the nearest of some others."""
+    return float(KDTree(together(others)).query(thing.points)[0].min())
+
+
+def _on(thing: Thing, places: Float[np.ndarray, "n 3"]) -> bool:
+    """Touching it: from above where that lies level, flush with it where it stands, either where it is none
+    of both, as a sofa; and near below a ceiling."""
+    distances = KDTree(thing.points).query(places)[0]
+    if _hangs(thing, places):
+        return True
+    if distances.min() > thing.touch:
+        return False
+    normal = _normal(places[distances <= thing.touch + thing.extent / 2])
+    near = places[distances <= thing.touch]
+    height = float(np.median(near[:, UP]))
+    above = thing.middle[UP] >= height - thing.touch / 4
+    if normal is None:
+        return bool(above)
+    upright = abs(normal[UP])
+    if upright >= _LEVEL:
+        return bool(above and thing.low[UP] >= height - thing.sizes[UP] / 2 - thing.touch)
+    off = abs((thing.points - near.mean(0)) @ normal)
+    flush = float(np.quantile(off, 0.8)) <= 1.5 * thing.touch
+    return bool(flush or (above and upright > 1 - _LEVEL))
+
+
+def _hangs(thing: Thing, places: Float[np.ndarray, "n 3"]) -> bool:
+    """Whether half of some places are over a thing's top, and the nearest of them not far over it."""
+    over = places[places[:, UP] > thing.high[UP] - thing.touch]
+    if len(over) < 0.5 * len(places) or np.ptp(over[:, [RIGHT, AWAY]], axis=0).max() < thing.extent:
+        return False
+    aside = np.hypot(*(over - thing.middle)[:, [RIGHT, AWAY]].T)
+    reach = max(thing.extent, _HANGING * thing.distance)
+    return bool(((aside <= reach) & (over[:, UP] <= thing.high[UP] + reach)).any())
+
+
+def _normal(points: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "3"] | None:
+    """Of the plane of some points; None where they are none."""
+    if len(points) < 3:
+        return None
+    values, vectors = np.linalg.eigh(np.cov((points - points.mean(0)).T))
+    flat = values[0] <= (2 * _FLAT) ** 2 * values[1] if values[1] > 0 else False
+    return vectors[:, 0] if flat else None
+
+
+def _over(upper: Thing, lower: Thing) -> bool:
+    """Whether one stands higher than the other, in one line from above or from the viewer."""
+    reach = 0.3 * max(upper.sizes[RIGHT], lower.sizes[RIGHT])
+    aside = max(upper.low[RIGHT] - lower.high[RIGHT], lower.low[RIGHT] - upper.high[RIGHT])
+    behind = max(upper.low[AWAY] - lower.high[AWAY], lower.low[AWAY] - upper.high[AWAY])
+    far = max(upper.extent, lower.extent) / 2 + upper.touch
+    return bool(aside <= reach and behind <= far and upper.middle[UP] > lower.middle[UP])
+
+
+def _above(thing: Thing, other: Thing) -> bool:
+    lowest = other.high[UP] - 0.25 * other.sizes[UP] - thing.touch
+    return _over(thing, other) and bool(thing.low[UP] >= lowest)
+
+
+def _under(thing: Thing, other: Thing) -> bool:
+    """Below its upper side, and within its outline or lower than all of it."""
+    return _over(other, thing) and bool(thing.middle[UP] < other.high[UP] - other.touch)
+
+
+def _beside(thing: Thing, other: Thing) -> bool:
+    """Near it, at about its height, and neither on top of it nor under it."""
+    near = max(_BESIDE * min(thing.extent, other.extent), thing.touch)
+    apart = max(thing.low[UP] - other.high[UP], other.low[UP] - thing.high[UP])
+    return bool(apart <= -thing.touch / 2) and gap(thing, [other]) <= near
+
+
+def _inside(thing: Thing, other: Thing) -> bool:
+    slack = thing.touch + 0.1 * other.sizes
+    return bool(((thing.middle >= other.low - slack) & (thing.middle <= other.high + slack)).all())
+
+
+def _left(thing: Thing, other: Thing) -> bool:
+    return thing.column < other.columns[0] + 0.1 * (other.columns[1] - other.columns[0])
+
+
+def _right(thing: Thing, other: Thing) -> bool:
+    return thing.column > other.columns[1] - 0.1 * (other.columns[1] - other.columns[0])
+
+
+def _before(thing: Thing, other: Thing) -> bool:
+    """Nearer to the viewer, and in the way to the other: their directions meet."""
+    common = min(thing.columns[1], other.columns[1]) - max(thing.columns[0], other.columns[0])
+    narrower = min(each.columns[1] - each.columns[0] for each in (thing, other))
+    return common >= _MEETS * narrower and bool(thing.middle[AWAY] < other.middle[AWAY] - thing.touch / 2)
+
+
+def _between(thing: Thing, one: Thing, two: Thing) -> bool:
+    """Along the way from one to the other, seen from above, and off it by less than half its length."""
+    start, end, place = (each.middle[[RIGHT, AWAY]] for each in (one, two, thing))
+    way = end - start
+    length = max(float(np.linalg.norm(way)), 1e-9)
+    along = float((place - start) @ way) / length**2
+    aside = abs(way[0] * (place - start)[1] - way[1] * (place - start)[0]) / length
+    return bool(0.05 <= along <= 0.95 and aside <= length / 2)
+
+
+_PAIRS = {
+    "in": _inside,
+    "under": _under,
+    "above": _above,
+    "beside": _beside,
+    "in front of": _before,
+    "behind": lambda thing, other: _before(other, thing),
+    "left of": _left,
+    "right of": _right,
+}

@@ -1,0 +1,139 @@
+"""Phrases choose among the things of a room whose places and colours are known."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import torch
+
+from langflash_core import pipeline
+from langflash_core.language.narrowing import viewer_axes
+from langflash_core.types import Scene
+from tests.boxroom import box_room
+
+SIZE = (192, 144)
+SURE = 0.93  # the words of this room alone, uncalibrated: at 0.8 its floor answers "chair"
+RED, GREEN, WHITE = (0.75, 0.08, 0.08), (0.1, 0.45, 0.15), (0.9, 0.9, 0.88)
+
+
+def painted() -> Scene:
+    """A white room with a red chair on the left, a green one on the right and a white table behind, seen
+    straight on."""
+    scene = box_room(pitch=12.0, roll=0.0, yaw=0.0)
+    words, east = scene.semantics.weight_ids[:, 0], scene.gaussians.means[:, 0]
+    rgb = torch.tensor(WHITE).expand(len(words), 3).clone()
+    rgb[(words == 3) & (east < 0)] = torch.tensor(RED)
+    rgb[(words == 3) & (east > 0)] = torch.tensor(GREEN)
+    sh = ((rgb - 0.5) / 0.28209479)[:, None]
+    return replace(scene, gaussians=replace(scene.gaussians, sh=sh))
+
+
+@pytest.fixture(scope="module")
+def ask():
+    scene = painted()
+    return lambda *phrases, **options: pipeline.query(
+        scene, phrases, size=SIZE, **{"threshold": SURE, **options}
+    )
+
+
+def side(mask: torch.Tensor) -> tuple[bool, bool]:
+    """Whether a mask has much on the left half of the picture, and on the right."""
+    left, right = mask[:, : SIZE[0] // 2].sum(), mask[:, SIZE[0] // 2 :].sum()
+    return bool(left > 0.1 * (left + right) > 0), bool(right > 0.1 * (left + right) > 0)
+
+
+LEFT, RIGHT, BOTH, NONE = (True, False), (False, True), (True, True), (False, False)
+ASKED = {
+    "chair": BOTH,
+    "red chair": LEFT,
+    "green chair": RIGHT,
+    "chair, not red": RIGHT,
+    "chair on the left": LEFT,
+    "right chair": RIGHT,
+    "first chair from the right": RIGHT,
+    "second chair": RIGHT,
+    "third chair": NONE,
+    "two chairs": BOTH,
+    "one chair": BOTH,
+    "blue chair": NONE,
+    "chair left of the table": LEFT,
+    "chair right of the table": RIGHT,
+    "chair closest to the door": RIGHT,
+    "chair on the floor": BOTH,
+    "chair on the table": NONE,
+    "chair beside the green chair": NONE,
+    "chair on the ceiling": NONE,
+    '"red chair"': BOTH,
+    "spider-man chair": BOTH,
+    "chair behind the table": NONE,
+}
+
+
+@pytest.mark.parametrize(("phrase", "sides"), ASKED.items())
+def test_the_chairs_that_a_phrase_means(ask, phrase: str, sides: tuple[bool, bool]) -> None:
+    result = ask(phrase)
+    assert (side(result.masks[0]), result.answers[0].found) == (sides, sides != NONE), result.answers[0]
+
+
+def test_phrases_asked_together_answer_as_alone(ask) -> None:
+    together = ask("red chair", "chair", "chair left of the table")
+    for row, phrase in enumerate(("red chair", "chair", "chair left of the table")):
+        alone = ask(phrase).relevance[0]  # of products of another shape: float32, times the temperature
+        assert torch.allclose(together.relevance[row], alone, atol=1e-5)
+    assert [answer.reading for answer in together.answers] == ["chair, red", "", "chair, left of table"]
+
+
+def test_what_is_kept_keeps_its_relevance(ask) -> None:
+    narrowed, head = ask("red chair").relevance[0], ask("chair").relevance[0]
+    assert (
+        torch.equal(narrowed, torch.where(narrowed > 0, head, 0.0))
+        and 0 < (narrowed > 0).sum() < (head > 0).sum()
+    )
+
+
+def test_people_are_told_why_nothing_is_left(ask) -> None:
+    notes = [
+        answer.note for answer in ask("blue chair", "third chair", "chair beside the lamp", "chair").answers
+    ]
+    assert notes == [
+        "no chair here looks blue",
+        "only 2 of them are seen here",
+        'no "lamp" is found here, to which the phrase relates it',
+        "",
+    ]
+
+
+def test_an_unknown_modifier_is_ignored_and_said(ask) -> None:
+    (answer,) = ask("spider-man chair").answers
+    assert answer.found and answer.reading == "chair"
+    assert answer.note == '"spider-man" says nothing that can be checked here, so this is "chair"'
+
+
+def test_a_thing_that_was_not_taught_is_told_the_nearest_word(ask) -> None:
+    (answer,) = ask("typewriter").answers
+    assert answer.note.startswith(
+        '"typewriter" is no thing that this model was taught; the nearest one it knows is "'
+    )
+
+
+def test_a_grey_picture_tells_no_colours() -> None:
+    scene = painted()
+    grey = scene.gaussians.sh.mean(-1, keepdim=True).expand(-1, -1, 3).contiguous()
+    scene = replace(scene, gaussians=replace(scene.gaussians, sh=grey))
+    (answer,) = pipeline.query(scene, "red chair", size=SIZE).answers
+    assert answer.found and "has no colours" in answer.note
+
+
+def test_by_cosine_too(ask) -> None:
+    assert side(ask("red chair", mode="cosine", threshold=0.7).masks[0]) == LEFT
+
+
+def test_the_viewer_stands_upright() -> None:
+    """Turned, leaning and looking down, up stays up and right is level."""
+    up = np.array([0.1, -0.9, 0.2]) / np.linalg.norm([0.1, -0.9, 0.2])
+    viewmat = torch.eye(4)
+    axes = viewer_axes(viewmat, up)
+    assert np.allclose(axes @ axes.T, np.eye(3), atol=1e-12) and np.linalg.det(axes) == pytest.approx(-1)
+    assert np.allclose(axes[1], up) and axes[0, 0] > 0.9 and axes[2, 2] > 0.9
+    down = viewer_axes(viewmat, np.array([0.0, 0.0, -1.0]))  # looking down: the picture's top is away
+    assert np.allclose(down, [[1, 0, 0], [0, 0, -1], [0, -1, 0]])
