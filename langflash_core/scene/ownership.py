@@ -40,14 +40,12 @@ def owned(
     viewmats: Float[Tensor, "V 4 4"],
     Ks: Float[Tensor, "V 3 3"],
     known: Bool[Tensor, "V H W"] | None = None,
-    fineness: Float[Tensor, " V"] | None = None,
 ) -> Bool[Tensor, "V H W"]:
     """(V, H, W) bool: the cells of each photo that it covers itself.
 
     Args:
         depths: (V, H, W) > 0. viewmats: (V, 4, 4). Ks: (V, 3, 3), pixels of the depth maps.
         known: (V, H, W) bool, the cells that may cover anything; None: all.
-        fineness: (V,) > 0 pixels of each photo in a row of a cell; None: as many in all.
     """
     known = torch.ones_like(depths, dtype=torch.bool) if known is None else known
     if len(depths) == 1:
@@ -55,7 +53,7 @@ def owned(
     first = leading(depths, viewmats)
     order = sorted(from_the_middle(depths, viewmats), key=lambda view: view not in first)
     keep, takers = torch.zeros_like(known), _takers(known, first)
-    logs, focals = depths.log().flatten(1), Ks[:, 0, 0] if fineness is None else Ks[:, 0, 0] * fineness
+    logs, focals = depths.log().flatten(1), Ks[:, 0, 0]
     for view in range(len(depths)):
         points, normals = _surface(depths[view], viewmats[view], Ks[view])
         finest, mine = torch.full_like(points[0], torch.inf), torch.zeros_like(points[0], dtype=torch.bool)

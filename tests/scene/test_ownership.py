@@ -144,17 +144,6 @@ def test_one_that_does_not_lead_takes_over_up_to_its_border(leads, monkeypatch):
     assert border.any() and (owned(*given)[0][border] == leads).all()
 
 
-@pytest.mark.parametrize(("fineness", "wins"), [(1.5, True), (1.3, False)])
-@pytest.mark.parametrize("views", [2, 3, 10])
-def test_a_larger_photo_is_finer(fineness, wins, views):
-    """Of photos from one place the last has so many more pixels in a row: their square is what counts."""
-    given = seen([camera()] * views)
-    keep = owned(*given, fineness=torch.tensor([1.0] * (views - 1) + [fineness]))
-    border = slice(None) if views == 2 else slice(4, -4)  # where others take nothing over, and a crumb
-    keep = keep[:, border, border]
-    assert keep[-1].all() == wins and keep[0].all() != wins and not keep[1:-1].any()
-
-
 def test_a_wall_seen_from_aside_is_left_to_the_photo_that_faces_it():
     given = seen([camera((-6.0, 0.0, 1.0), turn=(1.25, 0.0)), camera()])
     keep = owned(*given)
