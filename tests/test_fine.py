@@ -6,6 +6,7 @@ import pytest
 import torch
 from torch import Tensor
 
+from langflash_core import fine as module
 from langflash_core.detail import DETAILS
 from langflash_core.errors import InputError
 from langflash_core.fine import _told, coloured_scene, covered_scene
@@ -250,3 +251,12 @@ def test_colours_of_layers_are_the_same_with_several_threads(given):
             colours.append(coloured_scene(covered).gaussians.sh)
     # What is done of all layers at once, with several threads, are sums of two products.
     assert torch.allclose(*colours, rtol=0, atol=1e-6)
+
+
+def test_of_many_photos_those_all_over_the_walk_keep_a_layer(monkeypatch):
+    """Three of five that stand in a row: the first, the last and the middle one."""
+    monkeypatch.setattr(module, "MOST_LAYERS", 3)
+    scene, _ = made(photographed(5))
+    check_scene(scene)
+    assert scene.view_ids is not None and scene.view_ids.unique().tolist() == [0, 2, 4]
+    assert scene.num_views == 5 and len(scene.record.detail["photos_psnr_db"]) == 3
