@@ -11,6 +11,7 @@ from torch import Tensor
 from langflash_core.ahead import Ahead
 from langflash_core.detail import DEFAULT_DETAIL
 from langflash_core.errors import InputError, PromptError, ViewError
+from langflash_core.export import opened
 from langflash_core.export.html import Beside, Phrases, TextModel, write_html
 from langflash_core.images.decode import grey_photo
 from langflash_core.images.lens import Intrinsics
@@ -128,7 +129,7 @@ def reconstruct(
 
 
 def query(
-    scene: Scene,
+    scene: Scene | Path | str,
     prompts: Sequence[str] | str,
     *,
     view: int = 0,
@@ -142,6 +143,7 @@ def query(
     """Where in one view of a scene are these phrases?
 
     Args:
+        scene: or the path of one.
         prompts: phrases, or one.
         view: input photo whose camera is used, from 0; not asked for where `camera` is given.
         size: (width, height) in pixels; None: the camera's own. It is drawn in the light of its place
@@ -154,8 +156,10 @@ def query(
         ViewError: there is no such view, or the size cannot be drawn.
         PromptError: a prompt or the threshold cannot be used.
         WeightsError: the language space has no text weights.
+        SceneFileError: the path holds no scene. InputError: neither a scene nor a path was given.
     """
-    chosen = _camera(scene, view, camera, size)
+    scene = opened(scene)
+    chosen = seen_from(scene, view, camera, size)
     phrases = [prompts] if isinstance(prompts, str) else list(prompts)
     space = language_space(scene.semantics.space)
     compiled = compile_spoken(scene, space, phrases, negatives=negatives, mode=mode)
@@ -173,16 +177,20 @@ def query(
         return answer(relevance, frame, chosen, compiled, threshold)
 
 
-def select(scene: Scene, prompts: Sequence[str], *, threshold: float | None = None) -> Scene:
+def select(
+    scene: Scene | Path | str, prompts: Sequence[str] | str, *, threshold: float | None = None
+) -> Scene:
     """The part of a scene that answers at least one of these phrases, whatever the view.
 
     Args:
+        scene: or the path of one. prompts: phrases, or one.
         threshold: relevancy in [0, 1] from which a Gaussian is kept; None: the scene's calibration.
 
     Raises:
         PromptError: a prompt or the threshold cannot be used, or no Gaussian passes.
         WeightsError: the language space has no text weights.
     """
+    scene, prompts = opened(scene), [prompts] if isinstance(prompts, str) else prompts
     compiled = compile_spoken(scene, language_space(scene.semantics.space), list(prompts))
     limit = compiled.threshold if threshold is None else threshold
     _check_threshold(limit)
@@ -326,8 +334,12 @@ def best_pair(
     return choose_pair(greys, run.check)
 
 
-def _camera(scene: Scene, view: int, camera: Camera | None, size: tuple[int, int] | None) -> Camera:
-    """The camera asked for, at the size asked for."""
+def seen_from(scene: Scene, view: int, camera: Camera | None, size: tuple[int, int] | None) -> Camera:
+    """The camera asked for, at the size asked for, in the light of its place; as `query` takes them.
+
+    Raises:
+        ViewError: there is no such view, or the size cannot be drawn.
+    """
     if size is not None and not all(1 <= side <= LARGEST_PICTURE for side in size):
         raise ViewError(
             f"a picture of {size[0]}x{size[1]} cannot be drawn; choose 1 to {LARGEST_PICTURE} pixels"

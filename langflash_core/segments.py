@@ -10,12 +10,14 @@ so an edge has the thing's own colour, whatever stands behind or before it.
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import torch
 from torch import Tensor
 
 from langflash_core.errors import PromptError
+from langflash_core.export import opened
 from langflash_core.geometry.fusion import ColouredView, Surface, fuse
 from langflash_core.geometry.harmonics import SH_C0
 from langflash_core.language.answers import (
@@ -38,7 +40,9 @@ _LEAST = 1 / 255  # of a matte that has a colour
 _SAMPLES = 20_000  # of a surface, at most: quantiles need no more
 
 
-def segment(scene: Scene, prompts: Sequence[str], *, threshold: float | None = None) -> Segments:
+def segment(
+    scene: Scene | Path | str, prompts: Sequence[str] | str, *, threshold: float | None = None
+) -> Segments:
     """The Gaussians that answer each phrase, and the connected things among them.
 
     A phrase is found where some photo shows what answers it with `MIN_AREA` of its pixels. Connected things
@@ -46,11 +50,13 @@ def segment(scene: Scene, prompts: Sequence[str], *, threshold: float | None = N
     shown best always is. Of what is not found, nothing is a member.
 
     Args:
+        scene: or the path of one. prompts: phrases, or one.
         threshold: relevancy in [0, 1]; None: the scene's calibration.
 
     Raises:
         PromptError: a prompt or the threshold cannot be used. WeightsError: the space has no text weights.
     """
+    scene, prompts = opened(scene), [prompts] if isinstance(prompts, str) else prompts
     compiled = compile_spoken(scene, language_space(scene.semantics.space), list(prompts))
     limit = compiled.threshold if threshold is None else threshold
     if not 0 <= limit <= 1:

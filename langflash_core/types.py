@@ -20,8 +20,9 @@ Checks    constructors refuse shapes that disagree and numbers that name nothing
 """
 
 import math
+import reprlib
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field, fields, replace
 from importlib import import_module
 from typing import Any
 
@@ -37,6 +38,29 @@ from langflash_core.records import check_light
 
 LUMA = (0.299, 0.587, 0.114)
 """Weights of red, green and blue in grey (ITU-R BT.601, as JPEG has them)."""
+
+
+class _Brief(reprlib.Repr):
+    """Values as a notebook's cell prints them: of arrays and files their sizes, of long lists the start."""
+
+    def repr_Tensor(self, x: Any, level: int) -> str:
+        return f"{str(x.dtype).removeprefix('torch.')} {tuple(x.shape)}"
+
+    def repr_bytes(self, x: bytes, level: int) -> str:
+        return f"{len(x):,} bytes"
+
+    def repr_Camera(self, x: "Camera", level: int) -> str:
+        return f"Camera of {x.width} x {x.height}"
+
+
+_BRIEF = _Brief()
+_BRIEF.maxtuple, _BRIEF.maxother = 3, 300  # values; characters, which Gaussians of any number keep below
+
+
+def _brief(self: Any) -> str:
+    """The `repr` of a dataclass that holds arrays, in one line."""
+    told = (f"{own.name}={_BRIEF.repr(getattr(self, own.name))}" for own in fields(self) if own.repr)
+    return f"{type(self).__name__}({', '.join(told)})"
 
 
 @dataclass(frozen=True)
@@ -120,6 +144,8 @@ class Views:
     viewmats: Float[Tensor, "V 4 4"] | None = None
     lenses: Lenses | None = None
 
+    __repr__ = _brief
+
     @property
     def num_views(self) -> int:
         return self.images.shape[0]
@@ -152,6 +178,8 @@ class Gaussians:
         for name, tail in (("means", (3,)), ("quats", (4,)), ("scales", (3,)), ("opacities", ())):
             _shape(name, getattr(self, name), (count, *tail))
         _shape("sh", self.sh, (count, bases, 3))
+
+    __repr__ = _brief
 
     @staticmethod
     def none() -> "Gaussians":
@@ -197,6 +225,8 @@ class Semantics:
         _shape("weight_values", self.weight_values, tuple(self.weight_ids.shape))
         _names("weight_ids", self.weight_ids, self.num_atoms)
 
+    __repr__ = _brief
+
     @property
     def num_atoms(self) -> int:
         return self.dictionary.shape[0]
@@ -239,6 +269,8 @@ class Prediction:
     timings: dict[str, float] = field(default_factory=dict)
     Ks: Float[Tensor, "V 3 3"] | None = None
     lenses: tuple[FoundLens, ...] = ()
+
+    __repr__ = _brief
 
 
 @dataclass(frozen=True)
@@ -294,6 +326,18 @@ class Scene:
             atoms = torch.tensor(list(getattr(self.record, name)), dtype=torch.int64)
             _names(name, atoms, self.semantics.num_atoms)
         check_light(self.record.light, num_views)
+
+    def __repr__(self) -> str:
+        """Three lines: how large, what it speaks, what is known of it."""
+        (width, height), atoms, scale = self.view_size, self.semantics.num_atoms, self.record.metric_scale
+        views = f"{self.num_views} view{'s' * (self.num_views > 1)} of {width} x {height} pixels"
+        language = f"speaks {self.semantics.space!r} by {atoms} atoms" if atoms else "speaks no language"
+        length = f"{scale:.3g} m per scene unit" if scale else "metres per scene unit not known"
+        return (
+            f"Scene: {len(self.gaussians):,} Gaussians{', a layer per photo' * self.layered}; {views}\n"
+            f"  {language}; {len(self.photos)} photos kept in it\n"
+            f"  {length}; warnings: {len(self.record.warnings)} (scene.record.warnings)"
+        )
 
     @property
     def num_views(self) -> int:
@@ -374,15 +418,22 @@ class Frame:
     depths: Float[Tensor, "H W"]
     weight_maps: Float[Tensor, "H W K"] | None = None
 
+    __repr__ = _brief
+
+    def _repr_png_(self) -> bytes:
+        """The colours, as a notebook shows them below a cell."""
+        return import_module("langflash_core.export.png").rgb_file(self.rgb)
+
 
 @dataclass(frozen=True)
 class PromptAnswer:
-    """One phrase answered in one view; the fields of `query --json`.
+    """One phrase answered in one view; the fields of `query --json`, and the mask.
 
     score: the value compared with `threshold` to decide `found`. area: fraction of pixels in
     the mask. centroid, box (center, axes (3, 3) rows, size): scene units, None when not found. note: for
     people, where the phrase may not mean what was written; "" for most. reading: how the phrase was
-    understood, head first ("chair, white"); "" where it was asked as it stands.
+    understood, head first ("chair, white"); "" where it was asked as it stands. mask: (H, W) bool, its pixels
+    in that view, none where it is not found; None where nobody keeps it.
     """
 
     prompt: str
@@ -394,6 +445,7 @@ class PromptAnswer:
     box: dict | None
     note: str = ""
     reading: str = ""
+    mask: Bool[Tensor, "H W"] | None = field(default=None, repr=False, compare=False)
 
 
 @dataclass(frozen=True)
@@ -410,6 +462,19 @@ class QueryResult:
     masks: Bool[Tensor, "P H W"]
     frame: Frame
     camera: Camera
+
+    def __repr__(self) -> str:
+        """Three lines: of what, what is found, what is not."""
+        told = {
+            found: [f"{each.prompt} {each.score:.2f}" for each in self.answers if each.found == found]
+            for found in (True, False)
+        }
+        return (
+            f"QueryResult: {len(told[True])} of {len(self.answers)} phrases found in a view of "
+            f"{self.camera.width} x {self.camera.height} pixels, by {self.mode}\n"
+            f"  found: {_listed(told[True])}\n"
+            f"  not found: {_listed(told[False])}"
+        )
 
 
 @dataclass(frozen=True)
@@ -434,6 +499,8 @@ class Segments:
     def __post_init__(self) -> None:
         for name in ("members", "instances"):
             _shape(name, getattr(self, name), (len(self.prompts), *self.members.shape[1:]))
+
+    __repr__ = _brief
 
     @property
     def counts(self) -> tuple[int, ...]:
@@ -461,6 +528,8 @@ class SegmentedView:
     union: Float[Tensor, "H W"]
     things: Int[Tensor, "H W"]
 
+    __repr__ = _brief
+
     @property
     def masks(self) -> Bool[Tensor, "P H W"]:
         """(P, H, W) bool: at least half of the pixel is the phrase."""
@@ -471,6 +540,12 @@ class SegmentedView:
         """(H, W) int64: 1 + the phrase that most of the pixel is, where it is in a mask; else 0."""
         best, which = torch.where(self.masks, self.mattes, 0.0).max(0)
         return torch.where(best > 0, which + 1, 0)
+
+
+def _listed(names: Sequence[str], most: int = 6) -> str:
+    """The first of some names in a row, and how many more there are; "-": none."""
+    more = [f"{len(names) - most} more"] if len(names) > most else []
+    return ", ".join([*names[:most], *more]) or "-"
 
 
 def _shape(name: str, values: Tensor, expected: tuple[int, ...]) -> None:

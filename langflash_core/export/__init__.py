@@ -1,13 +1,14 @@
 """Scenes, views and answers out, scenes in: what a file's name ends in says how (`outputs.py`)."""
 
+import os
 from pathlib import Path
 
-from langflash_core.errors import LangFlashError, OutputError, SceneFileError
+from langflash_core.errors import InputError, LangFlashError, OutputError, SceneFileError
 from langflash_core.formats import AXES, kind_of
 from langflash_core.outputs import OUTPUTS, READERS, loaded
 from langflash_core.types import Frame, QueryResult, Scene
 
-__all__ = ["READERS", "WRITERS", "export", "read"]
+__all__ = ["READERS", "WRITERS", "export", "opened", "read"]
 
 _SUBJECTS = {
     "of_scene": (Scene, "a scene"),
@@ -29,15 +30,19 @@ def _writers() -> dict[str, dict[str, str]]:
 WRITERS = _writers()
 
 
-def export(subject: Scene | Frame | QueryResult, path: Path | str, *, axes: str | None = None) -> None:
+def export(
+    subject: Scene | Frame | QueryResult | Path | str, path: Path | str, *, axes: str | None = None
+) -> None:
     """Write `subject` in the format that the suffix of `path` names.
 
     Args:
+        subject: a scene or the path of one, a view, or an answer.
         axes: of a .spz, one of `formats.AXES`, which the file then names; None: the format's own.
 
     Raises:
         OutputError: unknown suffix, a suffix that cannot hold this subject, or an unwritable path; or axes
             that there are not, or of another file.
+        InputError: the subject is nothing that can be written.
     """
     path = Path(path)
     suffix = kind_of(path)
@@ -48,6 +53,8 @@ def export(subject: Scene | Frame | QueryResult, path: Path | str, *, axes: str 
         raise OutputError(
             f"cannot write {path.name}: the suffix {suffix or '(none)'} is unknown; use {known}"
         )
+    if not isinstance(subject, Frame | QueryResult):
+        subject = opened(subject)
     field = next(field for field, (kind, _) in _SUBJECTS.items() if isinstance(subject, kind))
     if field in writers:
         return loaded(writers[field])(subject, path, **more)
@@ -63,12 +70,14 @@ def read(path: Path | str, *, axes: str | None = None) -> Scene:
         axes: of a .spz that does not name its own, one of `formats.AXES`; None: the format's own.
 
     Raises:
-        SceneFileError: unknown suffix, or what the reader finds wrong; or axes that there are not, or of
-            another file.
+        SceneFileError: no such file, unknown suffix, or what the reader finds wrong; or axes that there are
+            not, or of another file.
     """
     path = Path(path)
     more = _told_axes(path, axes, SceneFileError)
     reader = READERS.get(kind_of(path), READERS.get(path.suffix.lower()))
+    if reader is None and not os.path.exists(path):  # unlike Path, without an error for any name
+        raise SceneFileError(f"scene {path} does not exist; check the path")
     if reader is None:
         known = ", ".join(sorted(READERS))
         raise SceneFileError(f"{path.name} is not a scene this program reads; name a file ending in {known}")
@@ -78,6 +87,22 @@ def read(path: Path | str, *, axes: str | None = None) -> Scene:
         raise SceneFileError(f"scene {path} does not exist; check the path") from error
     except OSError as error:
         raise SceneFileError(f"{path} cannot be read ({error.strerror}); check its permissions") from error
+
+
+def opened(scene: Scene | Path | str) -> Scene:
+    """A scene as it is, or read from the path that is given instead.
+
+    Raises:
+        SceneFileError: as `read`. InputError: it is neither.
+    """
+    if isinstance(scene, Scene):
+        return scene
+    if isinstance(scene, Path | str):
+        return read(scene)
+    raise InputError(
+        f"this takes a scene or the path of one, not {type(scene).__name__}; "
+        "make a scene with reconstruct, or read one with load"
+    )
 
 
 def _told_axes(path: Path, axes: str | None, error: type[LangFlashError]) -> dict[str, str]:

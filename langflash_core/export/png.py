@@ -28,7 +28,12 @@ def write_rgb(path: Path, rgb: Tensor) -> None:
     Raises:
         OutputError: the path cannot be written (all writers here). ValueError: another shape.
     """
-    write_atomically(path, _encoded(Image.fromarray(to_8bit(rgb))))
+    write_atomically(path, rgb_file(rgb))
+
+
+def rgb_file(rgb: Tensor) -> bytes:
+    """What `write_rgb` writes."""
+    return _encoded(Image.fromarray(to_8bit(rgb)))
 
 
 def write_mask(path: Path, mask: Tensor) -> None:

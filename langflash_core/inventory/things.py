@@ -14,6 +14,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
+from pathlib import Path
 
 import numpy as np
 import torch
@@ -21,6 +22,7 @@ from jaxtyping import Bool, Float, Integer
 from torch import Tensor
 
 from langflash_core.errors import InputError
+from langflash_core.export import opened
 from langflash_core.fused import fused_rows, told_in_layers
 from langflash_core.inventory.pieces import STRUCTURE, Parts, parts_of_room
 from langflash_core.language.answers import BOX_QUANTILES
@@ -101,6 +103,15 @@ class Inventory:
     parts: Parts = field(repr=False)
     things: tuple[Thing, ...] = ()
 
+    def __repr__(self) -> str:
+        """Three lines: how many things, of which kinds, in which unit."""
+        kinds = ", ".join(f"{count} {kind}" for kind, count in self.counts.items())
+        return (
+            f"Inventory: {len(self.things)} things (inventory.things)\n"
+            f"  {kinds or '-'}\n"
+            f"  lengths in {self.unit}{', a guess' if self.guess else ''}"
+        )
+
     @property
     def counts(self) -> dict[str, int]:
         """Things of each kind, the most first."""
@@ -138,16 +149,20 @@ class Inventory:
 
 
 @torch.no_grad()
-def inventory(scene: Scene, *, threshold: float | None = None, least: float = LEAST_SHARE) -> Inventory:
+def inventory(
+    scene: Scene | Path | str, *, threshold: float | None = None, least: float = LEAST_SHARE
+) -> Inventory:
     """The things of a scene.
 
     Args:
+        scene: or the path of one.
         threshold: mean relevancy from which a thing counts; None: the scene's calibration. least: share
             of a photo that a thing must fill in some photo.
 
     Raises:
         InputError: the scene holds nothing. PromptError: it has no language. WeightsError: it has no weights.
     """
+    scene = opened(scene)
     if not len(scene.gaussians):
         raise InputError("this scene is empty; make it again, or undo what deleted it")
     surface = fused_rows(scene).cpu() if scene.layered else None

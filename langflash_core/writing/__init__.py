@@ -8,6 +8,7 @@ from collections.abc import Callable
 from contextlib import AbstractContextManager
 from pathlib import Path
 
+from langflash_core.export import opened
 from langflash_core.files import check_folder, check_output_file, check_same_kind
 from langflash_core.formats import kind_of
 from langflash_core.outputs import ALL_OUT, PLY, SCENE, Output, loaded
@@ -45,7 +46,7 @@ def prepared(request: ExportRequest) -> tuple[Output, CameraChoice]:
 
 
 def write(
-    scene: Scene,
+    scene: Scene | Path | str,
     request: ExportRequest,
     *,
     renderers: Callable[[], AbstractContextManager[Renderer]] = torch_renderer,
@@ -54,6 +55,7 @@ def write(
     """Write what is asked for, all of it or nothing.
 
     Args:
+        scene: or the path of one.
         renderers: opens who draws, where something is drawn; the reference in torch by default.
 
     Returns:
@@ -63,6 +65,7 @@ def write(
         LangFlashError: the request cannot be fulfilled, or nothing answers.
     """
     kind, choice = prepared(request)
+    scene = opened(scene)
     said = loaded(kind.writer)(Job(request, kind, scene, choice, renderers, progress))
     return said + _unshifted(scene, request, kind)
 

@@ -2,7 +2,7 @@
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager, contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 from langflash_core import pipeline
@@ -17,6 +17,11 @@ from langflash_core.writing.cameras import CameraChoice
 from langflash_core.writing.renderers import Renderer, Shown
 
 Answers = tuple[PromptAnswer, ...]  # of one view
+
+
+def kept_of(result: QueryResult) -> Answers:
+    """The answers without their masks, to keep while other views are asked."""
+    return tuple(replace(each, mask=None) for each in result.answers)
 
 
 def no_progress(stage: str, fraction: float) -> None:

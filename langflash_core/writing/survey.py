@@ -26,6 +26,7 @@ from langflash_core.files import make_folder, write_atomically
 from langflash_core.language.relevance import Mode
 from langflash_core.pipeline import query
 from langflash_core.types import Camera, Frame, PromptAnswer, QueryResult, Scene
+from langflash_core.writing.job import kept_of
 
 MOST_VIEWS = 4
 """Of a scene, evenly among its photos: each takes as long as a query."""
@@ -89,7 +90,7 @@ def ask_scene(
     replies = []
     for place, own in enumerate(file_names([f"{name} {prompt}" for prompt in prompts])):
         view, result = best[place]
-        answer, picture = result.answers[place], f"{PICTURES}/{own}.jpg"
+        answer, picture = kept_of(result)[place], f"{PICTURES}/{own}.jpg"
         shown = heat_over(result.relevance[place], result.frame.rgb, answer.threshold, result.mode, colours)
         _write_picture(folder / picture, shown)
         photos = scene.record.photos

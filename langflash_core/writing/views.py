@@ -13,7 +13,7 @@ from langflash_core.export.png import heat_over, label_map, to_8bit, write_label
 from langflash_core.files import make_folder, staged_folder
 from langflash_core.outputs import LABELS, MASK
 from langflash_core.types import Camera, QueryResult
-from langflash_core.writing.job import Answers, Job, check_found
+from langflash_core.writing.job import Answers, Job, check_found, kept_of
 
 
 def write_pictures(job: Job) -> str:
@@ -29,7 +29,7 @@ def write_pictures(job: Job) -> str:
         if job.prompts:
             for target, result in zip(targets, job.answers(cameras, renderer), strict=True):
                 _write_answered(job, staging / target.name, result)
-                answers.append(result.answers)
+                answers.append(kept_of(result))
             check_found(answers)
         else:
             for index, (camera, target) in enumerate(zip(cameras, targets, strict=True)):
@@ -129,7 +129,7 @@ def write_coco_masks(job: Job) -> str:
     def pictured(results: Iterator[QueryResult]) -> Iterator[QueryResult]:
         for name, result in zip(names, results, strict=True):
             write_rgb(staging / name, result.frame.rgb)
-            answers.append(result.answers)
+            answers.append(kept_of(result))
             yield result
 
     with job.renderer() as renderer, staged_folder(output.parent) as staging:

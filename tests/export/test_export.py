@@ -168,5 +168,7 @@ def test_places_and_suffixes_that_cannot_be(tmp_path, result):
             attempt()
         assert "\n" not in str(caught.value) and ";" in str(caught.value)
     assert os.listdir(tmp_path) == ["file"] and blocker.read_bytes() == b"in the way"
-    with pytest.raises(SceneFileError, match=r"name a file ending in"):
+    with pytest.raises(SceneFileError, match=r"scene.obj does not exist; check the path"):
         read(tmp_path / "scene.obj")
+    with pytest.raises(SceneFileError, match=r"name a file ending in"):
+        read(blocker)
