@@ -380,7 +380,8 @@ def test_a_phrase_that_the_vocabulary_lacks_is_answered(page, reading, scene):
     page.type("comfy old seat")
     page.key("Enter")
     until(page, "document.querySelectorAll('.chip:not([data-state=pending])').length === 2")
-    check_answer(page, lf.query(scene, "comfy old seat", view=0), 0)
+    ours = lf.query(scene, '"comfy old seat"', view=0)  # as it stands: pages read no grammar
+    check_answer(page, replace(ours, answers=(replace(ours.answers[0], prompt="comfy old seat"),)), 0)
     page.value("document.getElementById('box').focus()")
     page.type("chair - chair")
     page.key("Enter")

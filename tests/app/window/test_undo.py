@@ -11,6 +11,7 @@ from types import NoneType, UnionType
 import numpy as np
 import pytest
 import torch
+from torch import Tensor
 
 from app.window import commands as do
 from app.window.asking import commands as ask
@@ -50,7 +51,7 @@ SAYS_WHICH = {
 }
 GIVEN = {("mode", str): "rgb", ("pair", tuple[int, int] | None): None}  # what else would be no answer
 TABLES = {Picture: PICTURES, Output: OFFERED}
-LAZY = {each.__name__: each for each in (CompiledQuery, Scene)}  # known to the type checker alone
+LAZY = {each.__name__: each for each in (CompiledQuery, Scene, Tensor)}  # known to the type checker alone
 SIZE = (64, 48)  # pixels of the picture that regions are drawn on
 
 
@@ -144,6 +145,7 @@ MADE: dict = {
     str: lambda chance, state: ("", "wall", "an armchair")[chance.integers(3)],
     bytes: lambda chance, state: chance.random(12_300, np.float32).tobytes(),
     np.ndarray: lambda chance, state: np.eye(3),
+    Tensor: lambda chance, state: torch.rand(1, 4, 4),
     datetime: lambda chance, state: datetime(2026, 1, 1),
     Path: lambda chance, state: Path(f"/nowhere/{chance.integers(5)}.langflash"),
 }
