@@ -52,8 +52,9 @@ def add_reconstruct(commands) -> None:
         "photos",
         nargs="+",
         type=Path,
-        metavar="PHOTO|FILM",
-        help="of a film its sharpest frames are taken, as `langflash frames` chooses them",
+        metavar="PHOTO|FILM|FOLDER",
+        help="a folder stands for the photos directly in it, in the order of their names, or else for its "
+        "films; of a film its sharpest frames are taken, as `langflash frames` chooses them",
     )
     add_output(command, "SCENE", "the scene to write")
     command.add_argument(
