@@ -194,7 +194,9 @@ def add_batch(commands) -> None:
 
 def add_query(commands) -> None:
     """`langflash query`."""
-    command = new_command(commands, "query", "where in a scene is each phrase? heat-maps, masks and numbers")
+    command = new_command(
+        commands, "query", "where in a scene is each phrase? a line each; with -o heat-maps and masks"
+    )
     command.add_argument("scene", nargs="?", metavar="SCENE", help="the scene to ask")
     command.add_argument("phrases", nargs="*", metavar="PROMPT", help='a phrase, e.g. "armchair"')
     command.add_argument(
@@ -228,7 +230,7 @@ def add_query(commands) -> None:
         help="what relevancy compares with (default: the language space's own)",
     )
     add_backend(command)
-    add_output(command, "DIR", "folder for the pictures")
+    add_output(command, "DIR", "folder for pictures; without it nothing is written", required=False)
     add_json(command)
     command.add_argument(
         "--npz", action="store_true", help="also write relevance, masks, depth and rgb as arrays"

@@ -30,9 +30,11 @@ def new_actions(commands, name: str, purpose: str):
     return command.add_subparsers(dest="action", metavar="ACTION", required=True)
 
 
-def add_output(command: argparse.ArgumentParser, metavar: str, purpose: str) -> None:
-    """-o, where the command writes."""
-    command.add_argument("-o", "--output", required=True, type=Path, metavar=metavar, help=purpose)
+def add_output(
+    command: argparse.ArgumentParser, metavar: str, purpose: str, *, required: bool = True
+) -> None:
+    """-o, where the command writes; where it is not `required`, the command can do without."""
+    command.add_argument("-o", "--output", required=required, type=Path, metavar=metavar, help=purpose)
 
 
 def add_network(command: argparse.ArgumentParser) -> None:

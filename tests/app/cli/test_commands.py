@@ -98,6 +98,24 @@ def test_query_for_people(run, scene_file, tmp_path):
     assert outcome.err == f"warning: {told}\n"  # no bar, no other warning
 
 
+def test_query_without_a_folder_writes_nothing(run, scene_file, tmp_path, monkeypatch):
+    """The same numbers as with one, without the file at the end of the line."""
+    kept = run("query", scene_file, "armchair", "submarine", "-o", tmp_path / "out", *TORCH)
+    (tmp_path / "here").mkdir()
+    monkeypatch.chdir(tmp_path / "here")
+    beside = set(os.listdir(scene_file.parent))
+    outcome = run("query", scene_file, "armchair", "submarine", *TORCH)
+    assert outcome.code == 0, outcome.err
+    assert outcome.out.splitlines() == [line.partition("  -> ")[0] for line in kept.out.splitlines()]
+    assert outcome.out.startswith("found") and "% of the picture, at (" in outcome.out
+    document = run("query", scene_file, "armchair", "--json", *TORCH).json()
+    assert document["prompts"][0]["found"] and document["prompts"][0]["files"] == {}
+    for words in ((scene_file, "armchair", "--npz"), ("--scenes", scene_file.parent, "armchair")):
+        refused = run("query", *words, *TORCH)
+        assert refused.code == 2 and "add -o FOLDER" in refused.err
+    assert not os.listdir() and set(os.listdir(scene_file.parent)) == beside
+
+
 def test_what_a_phrase_may_not_mean_is_said(run, scene_file, tmp_path):
     """On stderr and in the document, of whatever is asked; what it proposes takes the denied thing away."""
     words = ("no armchair", "armchiar", "wall - armchair")
