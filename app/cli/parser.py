@@ -8,8 +8,7 @@ from typing import Any, NoReturn
 import langflash_core
 from langflash_core.errors import InputError
 
-LAB = ("bench-network", "eval", "labels", "rooms", "train")
-"""Commands that make and judge the weights."""
+from .overview import in_groups
 
 _JUDGING, _SCENES, _SHOWING, _TRAINING = "judging", "scenes", "showing", "training"
 COMMANDS = {
@@ -73,14 +72,21 @@ def build_parser(command: str | None = None) -> Parser:
     """Every command this version has; `command` alone where it is one of them, which is sooner there."""
     parser = Parser(
         prog="langflash",
-        description="Unposed photos to a 3D Gaussian scene that answers words.",
+        usage="langflash [-h] [--version] COMMAND ...",
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+        epilog="langflash COMMAND --help lists the options of a command.",
         allow_abbrev=False,
     )
     parser.add_argument("--version", action="version", version=f"langflash {langflash_core.__version__}")
-    commands = parser.add_subparsers(dest="command", metavar="COMMAND", required=True)
+    commands = parser.add_subparsers(
+        dest="command", metavar="COMMAND", required=True, prog="langflash", help=argparse.SUPPRESS
+    )
     for name in [command] if command in COMMANDS else COMMANDS:
         words = import_module(f".words.{COMMANDS[name]}", __package__)
         getattr(words, f"add_{name.replace('-', '_')}")(commands)
+    purposes = {name: below.description or "" for name, below in commands.choices.items()}
+    about = "Makes 3D scenes of photos without poses, and finds things in them by words."
+    parser.description = f"{about}\n\n{in_groups(purposes)}"
     return parser
 
 

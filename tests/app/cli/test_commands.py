@@ -461,7 +461,7 @@ def test_interrupted_at_a_terminal(scene_file, tmp_path):
 
 def test_help_and_version_answer_at_once():
     """No torch, no OpenGL: 0.3 s are promised; three times that on a machine busy with other tests."""
-    for words in (["--help"], ["--version"], ["query", "--size"]):
+    for words in ([], ["--help"], ["--version"], ["query", "--size"]):
         start = time.perf_counter()
         done = subprocess.run(
             [sys.executable, "-m", "langflash_core", *words], capture_output=True, timeout=60
