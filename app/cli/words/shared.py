@@ -107,7 +107,11 @@ def add_camera(command: argparse.ArgumentParser) -> None:
         "--camera", type=Path, metavar="FILE", help="JSON with viewmat (4 x 4), K (3 x 3), width and height"
     )
     command.add_argument(
-        "--size", type=size, metavar="WxH", help="pixels to draw (default: as the network saw it)"
+        "--size",
+        type=size,
+        metavar="WxH",
+        help="pixels to draw (default: of pictures as many as the photo in the scene has; of boxes and "
+        "--segmented as the network saw it)",
     )
     command.add_argument(
         "--ortho",

@@ -1,5 +1,6 @@
 """Commands on a small scene: what they print, what they write, and that both backends agree."""
 
+import io
 import json
 import os
 import signal
@@ -16,9 +17,10 @@ from PIL import Image
 
 import langflash_core
 from langflash_core.pictures import PICTURES
+from langflash_core.scene.file import save
 from langflash_core.splat import render
 from langflash_core.types import Camera
-from tests.app.cli.conftest import HEIGHT, WIDTH, WORDS
+from tests.app.cli.conftest import HEIGHT, WIDTH, WORDS, stripes
 
 TORCH = ("--backend", "torch")
 
@@ -185,6 +187,34 @@ def test_size_and_camera_file(run, scene_file, tmp_path):
     assert run("render", scene_file, "-o", far, "--camera", camera, "--size", "80x60", *TORCH).code == 0
     assert pixels(near).shape == pixels(far).shape == (60, 80, 3)
     assert (pixels(far).sum(-1) > 0).mean() < (pixels(near).sum(-1) > 0).mean()  # smaller from further away
+
+
+def test_pictures_have_the_size_of_the_photos(run, tmp_path):
+    """Twice what the network saw; answers stay where they were."""
+    stream = io.BytesIO()
+    Image.new("RGB", (2 * WIDTH, 2 * HEIGHT)).save(stream, "JPEG")
+    scene, full = tmp_path / "scene.langflash", (2 * HEIGHT, 2 * WIDTH)
+    save(replace(stripes(), photos=(stream.getvalue(),) * 2), scene)
+    assert run("render", scene, "-o", tmp_path / "a.png", *TORCH).code == 0
+    assert pixels(tmp_path / "a.png").shape[:2] == full
+    asked = run("query", scene, "armchair", "-o", tmp_path / "q", "--npz", "--json", *TORCH).json()
+    assert asked["size"] == [*full[::-1]] and pixels(tmp_path / "q" / "armchair_heat.png").shape[:2] == full
+    assert np.load(tmp_path / "q" / "query.npz")["mask"].shape == (1, *full)
+    small = run(
+        "query", scene, "armchair", "-o", tmp_path / "s", "--size", f"{WIDTH}x{HEIGHT}", "--json", *TORCH
+    ).json()
+    assert small["size"] == [WIDTH, HEIGHT]
+    # A pixel of the smaller picture is 1 / WIDTH of it, and the stripe has one edge inside.
+    assert abs(small["prompts"][0]["area"] - asked["prompts"][0]["area"]) <= 1 / WIDTH
+    for name, what in (("coco.json", ""), ("numbers.npz", ""), ("mask.png", "mask"), ("cut.png", "")):
+        said = ("--what", what) if what else ()
+        done = run("export", scene, "-o", tmp_path / name, "--prompt", "armchair", *said, *TORCH)
+        assert done.code == 0, done.err
+    images = json.loads((tmp_path / "coco.json").read_text())["images"]
+    assert [(image["height"], image["width"]) for image in images] == [full, full]
+    assert np.load(tmp_path / "numbers.npz")["mask"].shape == (1, *full)
+    for name in ("mask.png", "cut.png"):
+        assert pixels(tmp_path / name).shape[:2] == full
 
 
 @pytest.mark.parametrize("backend", ["torch", "gl"])
