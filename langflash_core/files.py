@@ -18,8 +18,8 @@ from contextlib import contextmanager, suppress
 from functools import cache
 from pathlib import Path
 
-from langflash_core.errors import InputError, OutputError
-from langflash_core.formats import kind_of
+from langflash_core.errors import ImageError, InputError, OutputError
+from langflash_core.formats import is_film, is_photo, kind_of
 
 _HELD = "held"  # names the part that says who has a folder
 _STILL_ACTIVE = 259  # what Windows has for the exit code of a process that runs
@@ -277,6 +277,21 @@ def readable_file(path: Path, what: str, error: type[InputError]) -> Path:
         reason = getattr(problem, "strerror", None) or problem
         raise error(f"the {what} {path} cannot be read: {reason}") from None
     return path
+
+
+def photos_in(folder: Path) -> list[Path]:
+    """The photos that lie directly in a folder, else its films, in the order of their names; none of what
+    is hidden.
+
+    Raises:
+        ImageError: it cannot be read.
+    """
+    try:
+        files = sorted(path for path in folder.iterdir() if not path.name.startswith(".") and path.is_file())
+    except OSError as problem:
+        reason = problem.strerror or problem
+        raise ImageError(f"the folder {folder} cannot be read: {reason}; choose another") from None
+    return list(filter(is_photo, files)) or list(filter(is_film, files))
 
 
 def check_folder(folder: Path, option: str = "-o") -> None:

@@ -1,9 +1,11 @@
-"""Scene files that a command reads, checked before torch is loaded."""
+"""Scene files and photos that a command reads, checked before torch is loaded."""
 
+from collections.abc import Sequence
 from pathlib import Path
 
-from langflash_core.errors import SceneFileError
-from langflash_core.files import readable_file
+from langflash_core.errors import ImageError, SceneFileError
+from langflash_core.files import photos_in, readable_file
+from langflash_core.formats import is_film
 
 
 def checked_scene(path: Path) -> Path:
@@ -18,3 +20,24 @@ def checked_scene(path: Path) -> Path:
 
         check_container(path)
     return path
+
+
+def checked_photos(given: Sequence[Path]) -> list[Path]:
+    """Photos and films, each folder replaced by those in it; photos open.
+
+    Raises:
+        ImageError: a photo is missing or does not open, a folder cannot be read or holds none.
+    """
+    listed = list[Path]()
+    for path in given:
+        found = photos_in(path) if path.is_dir() else [path]
+        if not found:
+            raise ImageError(
+                f"the folder {path} holds no photos and no films; choose one that does, or use "
+                "langflash batch where its sub-folders hold them"
+            )
+        listed += found
+    for path in listed:
+        if not is_film(path):
+            readable_file(path, "photo", ImageError)
+    return listed

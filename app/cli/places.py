@@ -27,7 +27,7 @@ from langflash_core.picture_files import STORED, opened_picture
 from langflash_core.reconstruction.networks import Networks
 from langflash_core.scene.file import load, save
 from langflash_core.types import QueryResult, Scene
-from langflash_core.writing import Renderer, request_of_whole, write
+from langflash_core.writing import CameraChoice, Renderer, request_of_whole, write
 
 from .renderers import open_renderer
 from .report import explained, write_json
@@ -105,7 +105,8 @@ class _Maker:
     def _asked(self, scene: Scene, folder: Path) -> QueryResult:
         """Answer the phrases in the first photo's view; pictures as `query` writes them, and its document."""
         renderer = self._renderer()
-        result = pipeline.query(scene, self._order.prompts, render=renderer)
+        camera = CameraChoice(view=0, described=None, size=None, full=True).of(scene)
+        result = pipeline.query(scene, self._order.prompts, camera=camera, render=renderer)
         files = [
             {kind: Path(path).name for kind, path in entry.items()} for entry in write_answers(result, folder)
         ]

@@ -11,7 +11,8 @@ from collections.abc import Sequence
 from langflash_core.errors import LangFlashError
 from langflash_core.extras import optional_packages
 
-from .parser import LAB, build_parser, joined
+from .overview import LAB, first_day
+from .parser import build_parser, joined
 from .report import INTERRUPTED, explained, say_error
 
 # Imports make a million objects that stay; looking for garbage among them, as Python would do
@@ -50,7 +51,10 @@ def main(argv: Sequence[str] | None = None) -> int:
 def _run(argv: Sequence[str] | None) -> int:
     try:
         words = joined(sys.argv[1:] if argv is None else argv)
-        args = build_parser(words[0] if words else None).parse_args(words)
+        if not words:
+            print(first_day())
+            return 0
+        args = build_parser(words[0]).parse_args(words)
     except SystemExit as done:  # --help and --version
         return int(done.code or 0)
     if os.environ.get("LANGFLASH_PROGRESS"):

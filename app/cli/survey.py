@@ -20,6 +20,8 @@ def run_survey(args: Namespace, phrases: Sequence[str], negatives: Sequence[str]
     """
     if args.view is not None or args.camera or args.size or args.ortho or args.npz:
         raise InputError("--scenes chooses the views; leave out --view, --camera, --size, --ortho and --npz")
+    if args.output is None:
+        raise InputError("--scenes writes a table and a page of pictures; add -o FOLDER")
     paths = scene_files(args.scenes)
     once: dict[str, str] = {}
     for phrase in phrases:

@@ -14,6 +14,7 @@ from langflash_core.files import readable_file
 from langflash_core.formats import LARGEST_SIDE
 from langflash_core.geometry.reach import median_reach
 from langflash_core.limits import TEXT
+from langflash_core.picture_files import STORED, opened_picture
 from langflash_core.scene.exposure import lit_camera
 from langflash_core.types import Camera, Scene
 
@@ -28,13 +29,19 @@ class CameraChoice:
     """What the command line says about the camera, checked as far as it can be without a scene.
 
     view: index of a photo, None when `described` holds a camera. size: (width, height) to
-    draw, None for the camera's own. ortho: by parallel rays.
+    draw, None for the camera's own. ortho: by parallel rays. full: where no size is said, a photo's camera
+    has as many pixels as the photo that the scene keeps, not as the network saw.
     """
 
     view: int | None
     described: Camera | None
     size: tuple[int, int] | None
     ortho: bool = False
+    full: bool = False
+
+    def at_full_size(self) -> "CameraChoice":
+        """For pictures that people look at, or lay over the photos."""
+        return replace(self, full=True)
 
     def of(self, scene: Scene) -> Camera:
         """The camera for `scene`.
@@ -58,7 +65,8 @@ class CameraChoice:
                 f"there is no view {view}: this scene has {scene.num_views}, counted from 0; "
                 f"use --view 0{_last(scene.num_views)}"
             )
-        return lit_camera(scene, self._by_rays(scene.camera(view, *(self.size or (None, None))), scene))
+        size = self.size or (kept_size(scene, view) if self.full else scene.view_size)
+        return lit_camera(scene, self._by_rays(scene.camera(view, *size), scene))
 
     def _by_rays(self, camera: Camera, scene: Scene) -> Camera:
         if not self.ortho or camera.orthographic:
@@ -69,6 +77,18 @@ class CameraChoice:
         per_unit = camera.K / camera.K.new_tensor([[depth], [depth], [1.0]])
         per_unit[:2, 2] = camera.K[:2, 2]
         return replace(camera, K=per_unit, orthographic=True)
+
+
+def kept_size(scene: Scene, view: int) -> tuple[int, int]:
+    """(width, height) in pixels of the photo that a scene keeps of a view; as the network saw it where it
+    keeps none, or a damaged one."""
+    if not scene.photos:
+        return scene.view_size
+    try:
+        with opened_picture(scene.photos[view], STORED) as picture:
+            return picture.size
+    except (OSError, SyntaxError, ValueError):
+        return scene.view_size
 
 
 def chosen_camera(

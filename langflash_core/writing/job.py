@@ -61,15 +61,17 @@ class Job:
         """Whether no view is named, so that every photo's is meant."""
         return self.request.view is None and self.request.camera is None
 
-    def cameras(self) -> list[Camera]:
-        """Those that it is seen from: one, or all photos'.
+    def cameras(self, full: bool = False) -> list[Camera]:
+        """Those that it is seen from: one, or all photos'. full: as large as the photos that the scene keeps,
+        where no size is said.
 
         Raises:
             ViewError: the scene has no such view.
         """
+        choice = self.choice.at_full_size() if full else self.choice
         if (self.request.all_views or self.kind.every) and self.of_photos:
-            return [self.choice.of_photo(self.scene, view) for view in range(self.scene.num_views)]
-        return [self.choice.of(self.scene)]
+            return [choice.of_photo(self.scene, view) for view in range(self.scene.num_views)]
+        return [choice.of(self.scene)]
 
     def targets(self, cameras: Sequence[Camera]) -> tuple[Path, ...]:
         """The file of each camera, or the one of all; nothing else has its name, or that of what lies beside.

@@ -19,7 +19,7 @@ def write_parts(job: Job) -> str:
     Raises:
         LangFlashError: nothing answers, or a picture cannot be written.
     """
-    cameras = job.cameras()
+    cameras = job.cameras(full=True)
     targets = job.targets(cameras)
     with job.renderer() as renderer:
         numbers = [None] * len(cameras)

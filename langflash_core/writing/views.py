@@ -22,7 +22,7 @@ def write_pictures(job: Job) -> str:
     Raises:
         LangFlashError: nothing answers, or a picture cannot be written.
     """
-    cameras = job.cameras()
+    cameras = job.cameras(full=True)
     targets = job.targets(cameras)
     answers: list[Answers] = []
     with job.renderer() as renderer, staged_folder(job.request.output.parent) as staging:
@@ -68,7 +68,7 @@ def write_depth(job: Job) -> str:
     Raises:
         LangFlashError: a file cannot be written, or the package for it is missing.
     """
-    cameras = job.cameras()
+    cameras = job.cameras(full=True)
     targets = job.targets(cameras)
     metres = job.scene.record.metric_scale
     unit, maps = depth.unit_name(metres), []
@@ -103,7 +103,7 @@ def write_numbers(job: Job) -> str:
     Raises:
         LangFlashError: a phrase cannot be used, or the file cannot be written.
     """
-    camera, path = job.choice.of(job.scene), job.request.output
+    camera, path = job.choice.at_full_size().of(job.scene), job.request.output
     with job.renderer() as renderer:
         job.progress("drawing", 0.2)
         make_folder(path.parent)
@@ -121,7 +121,7 @@ def write_coco_masks(job: Job) -> str:
     Raises:
         LangFlashError: nothing answers, or a file cannot be written.
     """
-    cameras, output = job.cameras(), job.request.output
+    cameras, output = job.cameras(full=True), job.request.output
     job.targets(cameras)
     names = [picture.name for picture in job.kind.files_beside(output, len(cameras))]
     answers: list[Answers] = []

@@ -2,7 +2,7 @@
 
 from argparse import Namespace
 from pathlib import Path
-from typing import Any, TextIO
+from typing import TYPE_CHECKING, Any, TextIO
 
 from langflash_core.errors import InputError
 from langflash_core.files import check_folder, staged_folder
@@ -14,9 +14,13 @@ from ..report import ProgressBar, say_warnings, write_json
 from ..survey import run_survey
 from ..vocabulary import taught_by
 
+if TYPE_CHECKING:
+    from langflash_core.types import QueryResult
+
 
 def run(args: Namespace, out: TextIO) -> None:
-    """Answer every phrase in one view and write the pictures, all or none; or ask all scenes of a folder.
+    """Answer every phrase in one view and, with -o, write the pictures, all or none; or ask all scenes of a
+    folder.
 
     Raises:
         LangFlashError: the scene, a phrase, the camera or the folder cannot be used.
@@ -35,17 +39,19 @@ def run(args: Namespace, out: TextIO) -> None:
 def _one_scene(
     args: Namespace, path: Path, prompts: list[str], negatives: list[str] | None, out: TextIO
 ) -> None:
+    if args.npz and args.output is None:
+        raise InputError("--npz writes a file; add -o FOLDER")
     checked_scene(path)
-    check_folder(args.output)
+    if args.output is not None:
+        check_folder(args.output)
     from langflash_core import pipeline
-    from langflash_core.colormaps import HeatColours
-    from langflash_core.export.answers import answers_document, write_answers
+    from langflash_core.export.answers import answers_document
 
     from ..cameras import chosen_camera
     from ..renderers import open_renderer
     from ..scenes import open_scene
 
-    choice = chosen_camera(args)
+    choice = chosen_camera(args).at_full_size()
     scene = taught_by(args.vocabulary)(open_scene(path))
     camera = choice.of(scene)
     with ProgressBar() as progress, open_renderer(args.backend) as renderer:
@@ -54,11 +60,7 @@ def _one_scene(
             scene, prompts, camera=camera, mode=args.mode, negatives=negatives, render=renderer
         )
         progress("writing", 0.8)
-        with staged_folder(args.output) as staging:
-            staged = write_answers(
-                result, staging, npz=args.npz, colours=HeatColours(args.colormap, args.span)
-            )
-    files = [{kind: str(args.output / Path(path).name) for kind, path in entry.items()} for entry in staged]
+        files = [{} for _ in result.answers] if args.output is None else _written(args, result)
     document = {"scene": str(path), "view": choice.view, "backend": renderer.backend}
     document.update(answers_document(scene, result, files))
     say_warnings(dict.fromkeys(answer.note for answer in result.answers if answer.note))
@@ -66,6 +68,20 @@ def _one_scene(
         write_json(document, out)
     else:
         print("\n".join(_line(entry, document["unit"]) for entry in document["prompts"]), file=out)
+
+
+def _written(args: Namespace, result: "QueryResult") -> list[dict[str, str]]:
+    """The files in the folder of -o, by kind, an entry a phrase.
+
+    Raises:
+        OutputError: the folder cannot be written.
+    """
+    from langflash_core.colormaps import HeatColours
+    from langflash_core.export.answers import write_answers
+
+    with staged_folder(args.output) as staging:
+        staged = write_answers(result, staging, npz=args.npz, colours=HeatColours(args.colormap, args.span))
+    return [{kind: str(args.output / Path(path).name) for kind, path in entry.items()} for entry in staged]
 
 
 def _line(entry: dict[str, Any], unit: str) -> str:
@@ -77,4 +93,4 @@ def _line(entry: dict[str, Any], unit: str) -> str:
     if entry["found"]:
         where = ", ".join(f"{value:.2f}" for value in entry["centroid"])
         line += f", {entry['area']:.1%} of the picture, at ({where}) {'m' if unit == 'm' else 'scene units'}"
-    return line + f"  -> {entry['files']['heat']}"
+    return line + (f"  -> {entry['files']['heat']}" if entry["files"] else "")

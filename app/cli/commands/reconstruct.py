@@ -7,11 +7,11 @@ from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
 
-from langflash_core.errors import ImageError, InputError, WeightsError
+from langflash_core.errors import InputError, WeightsError
 from langflash_core.files import check_output_file, held_alone, readable_file
-from langflash_core.formats import is_film
 from langflash_core.keeping import forget, holds_steps
 
+from ..files import checked_photos
 from ..films import recorded, with_frames
 from ..report import INTERRUPTED, ProgressBar, say_error, say_warnings, write_json
 
@@ -27,9 +27,7 @@ def run(args: Namespace, out: TextIO) -> int:
         LangFlashError: a photo, the weights, the device or the output cannot be used.
     """
     start = time.perf_counter()
-    for photo in args.photos:
-        if not is_film(photo):
-            readable_file(photo, "photo", ImageError)
+    args.photos = checked_photos(args.photos)
     if args.weights is not None:
         readable_file(args.weights, "checkpoint", WeightsError)
     check_output_file(args.output, (".langflash",), inputs=args.photos)

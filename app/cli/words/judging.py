@@ -18,7 +18,9 @@ BENCH_AXES = (
 
 def add_bench(commands) -> None:
     """`langflash bench`."""
-    command = new_command(commands, "bench", "how fast each way of drawing is, and what it gets wrong")
+    command = new_command(
+        commands, "bench", "measure how fast each way of drawing is, and what it gets wrong"
+    )
     command.add_argument("scene", nargs="?", type=Path, metavar="SCENE")
     command.add_argument("--synthetic", type=whole_count, metavar="N", help="a generated room of N Gaussians")
     command.add_argument(
@@ -47,7 +49,7 @@ def add_bench(commands) -> None:
 def add_bench_network(commands) -> None:
     """`langflash bench network`."""
     command = new_command(
-        commands, "bench-network", "how long each stage of the network takes (also: bench network)"
+        commands, "bench-network", "measure how long each stage of the network takes (also: bench network)"
     )
     command.add_argument("--preset", choices=("mini", "full"), default="full", help="(default: full)")
     weights = command.add_mutually_exclusive_group()
@@ -76,7 +78,7 @@ def add_bench_network(commands) -> None:
 
 def add_eval(commands) -> None:
     """`langflash eval`."""
-    actions = new_actions(commands, "eval", "how good a checkpoint is on rooms it has never seen")
+    actions = new_actions(commands, "eval", "judge how good a checkpoint is on rooms that it has never seen")
     rooms = new_command(
         actions, "rooms", "geometry, pictures, labels and phrases, with trivial answers beside"
     )

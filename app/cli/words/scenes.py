@@ -47,13 +47,14 @@ def add_view(commands) -> None:
 
 def add_reconstruct(commands) -> None:
     """`langflash reconstruct`."""
-    command = new_command(commands, "reconstruct", "photos of one place, or a film of it, to a scene file")
+    command = new_command(commands, "reconstruct", "make a scene of photos of one place, or of a film of it")
     command.add_argument(
         "photos",
         nargs="+",
         type=Path,
-        metavar="PHOTO|FILM",
-        help="of a film its sharpest frames are taken, as `langflash frames` chooses them",
+        metavar="PHOTO|FILM|FOLDER",
+        help="a folder stands for the photos directly in it, in the order of their names, or else for its "
+        "films; of a film its sharpest frames are taken, as `langflash frames` chooses them",
     )
     add_output(command, "SCENE", "the scene to write")
     command.add_argument(
@@ -120,7 +121,7 @@ def add_frames(commands) -> None:
     command = new_command(
         commands,
         "frames",
-        "the sharpest frames of a film as photos, spaced by how far the picture moves",
+        "take the sharpest frames of a film as photos, spaced by how far the picture moves",
         epilog="A film that was looked at is not decoded again. Frames are at most 1920 pixels long.",
     )
     command.add_argument("film", type=Path, metavar="FILM", help=".mp4, .mov, .mkv, .webm, .avi and others")
@@ -147,7 +148,7 @@ def add_batch(commands) -> None:
     command = new_command(
         commands,
         "batch",
-        "many sets of photos to scenes; an interrupted run continues, and what is done is not done again",
+        "make scenes of many sets of photos; what is done is not done again, also after an interruption",
         epilog="The exit code is 0 when all sets are done, 1 when some failed (ledger.csv says why), "
         "2 for bad input, 130 after Ctrl-C.",
     )
@@ -193,7 +194,9 @@ def add_batch(commands) -> None:
 
 def add_query(commands) -> None:
     """`langflash query`."""
-    command = new_command(commands, "query", "where in a scene is each phrase? heat-maps, masks and numbers")
+    command = new_command(
+        commands, "query", "find phrases in a scene: a line each; with -o also heat-maps and masks"
+    )
     command.add_argument("scene", nargs="?", metavar="SCENE", help="the scene to ask")
     command.add_argument("phrases", nargs="*", metavar="PROMPT", help='a phrase, e.g. "armchair"')
     command.add_argument(
@@ -227,7 +230,7 @@ def add_query(commands) -> None:
         help="what relevancy compares with (default: the language space's own)",
     )
     add_backend(command)
-    add_output(command, "DIR", "folder for the pictures")
+    add_output(command, "DIR", "folder for pictures; without it nothing is written", required=False)
     add_json(command)
     command.add_argument(
         "--npz", action="store_true", help="also write relevance, masks, depth and rgb as arrays"
@@ -237,7 +240,7 @@ def add_query(commands) -> None:
 
 def add_render(commands) -> None:
     """`langflash render`."""
-    command = new_command(commands, "render", "one picture of a scene")
+    command = new_command(commands, "render", "draw one picture of a scene")
     command.add_argument("scene", type=Path, metavar="SCENE")
     add_output(command, "IMG", "the .png to write")
     add_camera(command)
@@ -261,7 +264,7 @@ def add_render(commands) -> None:
 def add_export(commands) -> None:
     """`langflash export`."""
     command = new_command(
-        commands, "export", "a scene, or what answers a phrase, as a file for other programs"
+        commands, "export", "write a scene, or what answers a phrase, as a file for other programs"
     )
     command.add_argument("scene", type=Path, metavar="SCENE")
     add_output(
@@ -339,7 +342,7 @@ def add_export(commands) -> None:
 def add_lift(commands) -> None:
     """`langflash lift`."""
     command = new_command(
-        commands, "lift", "groups and a dictionary for plain splats, so that they answer phrases"
+        commands, "lift", "give plain splats groups and a dictionary, so that they answer phrases"
     )
     command.add_argument("scene", type=Path, metavar="SCENE", help="a splat file, or a scene to name anew")
     add_output(command, "SCENE", "the .langflash, or .ply or .glb with its language, to write")
@@ -459,7 +462,9 @@ def add_clean(commands) -> None:
 def add_level(commands) -> None:
     """`langflash level`."""
     command = new_command(
-        commands, "level", "which way is up, where the floor is, which way is north, and how large it may be"
+        commands,
+        "level",
+        "find which way is up, where the floor is, which way is north, and how large it may be",
     )
     command.add_argument("scene", type=Path, metavar="SCENE")
     command.add_argument(
@@ -487,7 +492,7 @@ def add_inventory(commands) -> None:
     command = new_command(
         commands,
         "inventory",
-        "what is in a room, how large, where, how sure; what changed since another scene",
+        "list what is in a room, how large, where, how sure; what changed since another scene",
     )
     command.add_argument("scene", type=Path, metavar="SCENE")
     command.add_argument(
@@ -517,7 +522,7 @@ def add_inventory(commands) -> None:
 
 def add_info(commands) -> None:
     """`langflash info`."""
-    command = new_command(commands, "info", "what a scene file holds, and what pruning saved")
+    command = new_command(commands, "info", "tell what a scene file holds, and what pruning saved")
     command.add_argument("scene", type=Path, nargs="?", metavar="SCENE", help=".langflash or a splat file")
     command.add_argument(
         "--sbom", action="store_true", help="what is installed, as a bill of materials (CycloneDX JSON)"
@@ -531,7 +536,7 @@ def add_info(commands) -> None:
 
 def add_words(commands) -> None:
     """`langflash words`."""
-    actions = new_actions(commands, "words", "what was taught in some scenes, kept and taught to others")
+    actions = new_actions(commands, "words", "keep what was taught in some scenes, and teach it to others")
     learn = new_command(actions, "learn", "names and denials that scenes were given, into a vocabulary")
     learn.add_argument(
         "scenes", nargs="+", type=Path, metavar="SCENE", help="scenes in which groups were named"
@@ -550,7 +555,7 @@ def add_words(commands) -> None:
 
 def add_weights(commands) -> None:
     """`langflash weights`."""
-    actions = new_actions(commands, "weights", "the checkpoints this installation holds, and published ones")
+    actions = new_actions(commands, "weights", "list, fetch and check the checkpoints of the networks")
     listing = new_command(actions, "list", "name, size and origin of each checkpoint, and what can be had")
     add_json(listing)
     get = new_command(

@@ -30,9 +30,11 @@ def new_actions(commands, name: str, purpose: str):
     return command.add_subparsers(dest="action", metavar="ACTION", required=True)
 
 
-def add_output(command: argparse.ArgumentParser, metavar: str, purpose: str) -> None:
-    """-o, where the command writes."""
-    command.add_argument("-o", "--output", required=True, type=Path, metavar=metavar, help=purpose)
+def add_output(
+    command: argparse.ArgumentParser, metavar: str, purpose: str, *, required: bool = True
+) -> None:
+    """-o, where the command writes; where it is not `required`, the command can do without."""
+    command.add_argument("-o", "--output", required=required, type=Path, metavar=metavar, help=purpose)
 
 
 def add_network(command: argparse.ArgumentParser) -> None:
@@ -105,7 +107,11 @@ def add_camera(command: argparse.ArgumentParser) -> None:
         "--camera", type=Path, metavar="FILE", help="JSON with viewmat (4 x 4), K (3 x 3), width and height"
     )
     command.add_argument(
-        "--size", type=size, metavar="WxH", help="pixels to draw (default: as the network saw it)"
+        "--size",
+        type=size,
+        metavar="WxH",
+        help="pixels to draw (default: of pictures as many as the photo in the scene has; of boxes and "
+        "--segmented as the network saw it)",
     )
     command.add_argument(
         "--ortho",

@@ -12,7 +12,7 @@ SHELLS = ("bash", "zsh", "fish")
 def add_tour(commands) -> None:
     """`langflash tour`."""
     actions = new_actions(
-        commands, "tour", "a guided tour of a scene: named views, pinned notes and measures"
+        commands, "tour", "make a guided tour of a scene: named views, pinned notes and measures"
     )
     listing = _action(actions, "list", "its stops, in order, and its notes")
     add_json(listing)
@@ -84,7 +84,7 @@ def add_completion(commands) -> None:
     command = new_command(
         commands,
         "completion",
-        "what makes a shell complete commands, options and their words",
+        "print what makes a shell complete commands, options and their words",
         epilog='bash: eval "$(langflash completion bash)"; zsh: the same with zsh; '
         "fish: langflash completion fish | source",
     )
@@ -94,7 +94,7 @@ def add_completion(commands) -> None:
 def add_desktop(commands) -> None:
     """`langflash desktop`."""
     command = new_command(
-        commands, "desktop", "an entry in the menu, and .langflash files that open with a click (Linux)"
+        commands, "desktop", "add an entry to the menu, and open .langflash files by a click (Linux)"
     )
     way = command.add_mutually_exclusive_group(required=True)
     way.add_argument("--install", action="store_true", help="for this user, in the XDG folders")

@@ -16,7 +16,7 @@ LAYOUTS = (
 
 def add_rooms(commands) -> None:
     """`langflash rooms`."""
-    actions = new_actions(commands, "rooms", "furnished rooms for training and tests")
+    actions = new_actions(commands, "rooms", "make furnished rooms for training and tests")
     pack = new_command(actions, "pack", "furniture libraries (.sh3f) to one pack")
     pack.add_argument("folder", type=Path, metavar="FOLDER")
     add_output(pack, "PACK", "the pack to write")
@@ -45,7 +45,7 @@ def add_labels(commands) -> None:
     command = new_command(
         commands,
         "labels",
-        "what is where in every frame of a clip, and what it is, to train on; what is done is not done again",
+        "label what is where in every frame of a clip, to train on; what is done is not done again",
         epilog="The exit code is 0 when all clips are done, 1 when some failed (ledger.csv says why), "
         "2 for bad input, 130 after Ctrl-C.",
     )

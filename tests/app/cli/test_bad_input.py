@@ -275,15 +275,39 @@ def test_output_folder_that_cannot_be_written(refused, scene_file, photo):
 
 
 def test_unknown_words(refused):
-    assert "COMMAND" in refused()
+    assert "COMMAND" in refused("--")
     assert "scene to measure" in refused("bench")
     assert "frobnicate" in refused("frobnicate")
     assert "--jsn" in refused("info", "x", "--jsn")
 
 
+@pytest.mark.parametrize(
+    ("written", "meant"),
+    [
+        ("recontruct", "langflash reconstruct"),
+        ("exprot", "langflash export"),
+        ("Query", "langflash query"),
+        ("rec", "langflash reconstruct"),
+        ("bench-netwrok", "langflash bench-network"),
+        ("tour stpo", "langflash tour stop"),
+        ("weights lst", "langflash weights list"),
+    ],
+)
+def test_a_word_close_to_a_command(refused, written, meant):
+    sentence = f'langflash: "langflash {written}" is not a command; did you mean "{meant}"?\n'
+    assert refused(*written.split(), "room.langflash") == sentence
+
+
+@pytest.mark.parametrize("written", ["frobnicate", "x", "", "photo.jpg", "tour wander"])
+def test_a_word_close_to_no_command(refused, written):
+    group = "langflash tour" if written.startswith("tour") else "langflash"
+    sentence = f'langflash: "langflash {written}" is not a command; {group} --help lists them\n'
+    assert refused(*written.split(" ")) == sentence
+
+
 def test_from_a_shell(tmp_path):
     """The same through a real process: exit code, one sentence, an empty stdout, no traceback."""
-    for words in (["render", "gone.langflash", "-o", "a.png"], ["frobnicate"], []):
+    for words in (["render", "gone.langflash", "-o", "a.png"], ["frobnicate"]):
         done = subprocess.run(
             [sys.executable, "-m", "langflash_core", *words],
             capture_output=True,

@@ -1,3 +1,4 @@
+import io
 import json
 import math
 from argparse import Namespace
@@ -5,6 +6,7 @@ from dataclasses import replace
 
 import pytest
 import torch
+from PIL import Image
 
 from app.cli.cameras import chosen_camera
 from langflash_core.errors import ViewError
@@ -28,6 +30,29 @@ def test_size_keeps_the_field_of_view():
     assert (camera.width, camera.height) == (2 * WIDTH, 3 * HEIGHT)
     scale = torch.tensor([2.0, 3.0, 1.0])[:, None]
     assert torch.equal(camera.K, scene.Ks[1] * scale)
+
+
+def jpeg(width: int, height: int) -> bytes:
+    stream = io.BytesIO()
+    Image.new("RGB", (width, height), (90, 60, 30)).save(stream, "JPEG")
+    return stream.getvalue()
+
+
+def test_at_full_size_a_view_has_the_pixels_of_its_photo():
+    """Of each its own; a size that is said counts more; a damaged photo says nothing."""
+    sizes = ((2 * WIDTH, 2 * HEIGHT), (3 * WIDTH, 3 * HEIGHT))
+    scene = replace(stripes(), photos=tuple(jpeg(*size) for size in sizes))
+    for view, size in enumerate(sizes):
+        camera = choice(view=view).at_full_size().of(scene)
+        assert (camera.width, camera.height) == size
+        assert torch.equal(camera.K[:2], scene.Ks[view][:2] * size[0] / WIDTH)
+        plain = choice(view=view).of(scene)
+        assert (plain.width, plain.height) == (WIDTH, HEIGHT)
+        said = choice(view=view, size=(80, 60)).at_full_size().of(scene)
+        assert (said.width, said.height) == (80, 60)
+    for photos in ((), (b"no photo", b"none")):
+        camera = choice().at_full_size().of(replace(scene, photos=photos))
+        assert (camera.width, camera.height) == (WIDTH, HEIGHT)
 
 
 def test_unknown_view_names_the_range():

@@ -1,5 +1,6 @@
 """Commands on a small scene: what they print, what they write, and that both backends agree."""
 
+import io
 import json
 import os
 import signal
@@ -16,9 +17,10 @@ from PIL import Image
 
 import langflash_core
 from langflash_core.pictures import PICTURES
+from langflash_core.scene.file import save
 from langflash_core.splat import render
 from langflash_core.types import Camera
-from tests.app.cli.conftest import HEIGHT, WIDTH, WORDS
+from tests.app.cli.conftest import HEIGHT, WIDTH, WORDS, stripes
 
 TORCH = ("--backend", "torch")
 
@@ -98,6 +100,24 @@ def test_query_for_people(run, scene_file, tmp_path):
     assert outcome.err == f"warning: {told}\n"  # no bar, no other warning
 
 
+def test_query_without_a_folder_writes_nothing(run, scene_file, tmp_path, monkeypatch):
+    """The same numbers as with one, without the file at the end of the line."""
+    kept = run("query", scene_file, "armchair", "submarine", "-o", tmp_path / "out", *TORCH)
+    (tmp_path / "here").mkdir()
+    monkeypatch.chdir(tmp_path / "here")
+    beside = set(os.listdir(scene_file.parent))
+    outcome = run("query", scene_file, "armchair", "submarine", *TORCH)
+    assert outcome.code == 0, outcome.err
+    assert outcome.out.splitlines() == [line.partition("  -> ")[0] for line in kept.out.splitlines()]
+    assert outcome.out.startswith("found") and "% of the picture, at (" in outcome.out
+    document = run("query", scene_file, "armchair", "--json", *TORCH).json()
+    assert document["prompts"][0]["found"] and document["prompts"][0]["files"] == {}
+    for words in ((scene_file, "armchair", "--npz"), ("--scenes", scene_file.parent, "armchair")):
+        refused = run("query", *words, *TORCH)
+        assert refused.code == 2 and "add -o FOLDER" in refused.err
+    assert not os.listdir() and set(os.listdir(scene_file.parent)) == beside
+
+
 def test_what_a_phrase_may_not_mean_is_said(run, scene_file, tmp_path):
     """On stderr and in the document, of whatever is asked; what it proposes takes the denied thing away."""
     words = ("no armchair", "armchiar", "wall - armchair")
@@ -167,6 +187,34 @@ def test_size_and_camera_file(run, scene_file, tmp_path):
     assert run("render", scene_file, "-o", far, "--camera", camera, "--size", "80x60", *TORCH).code == 0
     assert pixels(near).shape == pixels(far).shape == (60, 80, 3)
     assert (pixels(far).sum(-1) > 0).mean() < (pixels(near).sum(-1) > 0).mean()  # smaller from further away
+
+
+def test_pictures_have_the_size_of_the_photos(run, tmp_path):
+    """Twice what the network saw; answers stay where they were."""
+    stream = io.BytesIO()
+    Image.new("RGB", (2 * WIDTH, 2 * HEIGHT)).save(stream, "JPEG")
+    scene, full = tmp_path / "scene.langflash", (2 * HEIGHT, 2 * WIDTH)
+    save(replace(stripes(), photos=(stream.getvalue(),) * 2), scene)
+    assert run("render", scene, "-o", tmp_path / "a.png", *TORCH).code == 0
+    assert pixels(tmp_path / "a.png").shape[:2] == full
+    asked = run("query", scene, "armchair", "-o", tmp_path / "q", "--npz", "--json", *TORCH).json()
+    assert asked["size"] == [*full[::-1]] and pixels(tmp_path / "q" / "armchair_heat.png").shape[:2] == full
+    assert np.load(tmp_path / "q" / "query.npz")["mask"].shape == (1, *full)
+    small = run(
+        "query", scene, "armchair", "-o", tmp_path / "s", "--size", f"{WIDTH}x{HEIGHT}", "--json", *TORCH
+    ).json()
+    assert small["size"] == [WIDTH, HEIGHT]
+    # A pixel of the smaller picture is 1 / WIDTH of it, and the stripe has one edge inside.
+    assert abs(small["prompts"][0]["area"] - asked["prompts"][0]["area"]) <= 1 / WIDTH
+    for name, what in (("coco.json", ""), ("numbers.npz", ""), ("mask.png", "mask"), ("cut.png", "")):
+        said = ("--what", what) if what else ()
+        done = run("export", scene, "-o", tmp_path / name, "--prompt", "armchair", *said, *TORCH)
+        assert done.code == 0, done.err
+    images = json.loads((tmp_path / "coco.json").read_text())["images"]
+    assert [(image["height"], image["width"]) for image in images] == [full, full]
+    assert np.load(tmp_path / "numbers.npz")["mask"].shape == (1, *full)
+    for name in ("mask.png", "cut.png"):
+        assert pixels(tmp_path / name).shape[:2] == full
 
 
 @pytest.mark.parametrize("backend", ["torch", "gl"])
@@ -443,7 +491,7 @@ def test_interrupted_at_a_terminal(scene_file, tmp_path):
 
 def test_help_and_version_answer_at_once():
     """No torch, no OpenGL: 0.3 s are promised; three times that on a machine busy with other tests."""
-    for words in (["--help"], ["--version"], ["query", "--size"]):
+    for words in ([], ["--help"], ["--version"], ["query", "--size"]):
         start = time.perf_counter()
         done = subprocess.run(
             [sys.executable, "-m", "langflash_core", *words], capture_output=True, timeout=60
