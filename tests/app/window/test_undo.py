@@ -49,7 +49,11 @@ SAYS_WHICH = {
     "kind": ("info", "error"),
     "then": ("", "delete", "select"),
 }
-GIVEN = {("mode", str): "rgb", ("pair", tuple[int, int] | None): None}  # what else would be no answer
+GIVEN = {
+    ("mode", str): "rgb",
+    ("pair", tuple[int, int] | None): None,
+    ("name", tuple): ("a view",),
+}  # what else would be no answer
 TABLES = {Picture: PICTURES, Output: OFFERED}
 LAZY = {each.__name__: each for each in (CompiledQuery, Scene, Tensor)}  # known to the type checker alone
 SIZE = (64, 48)  # pixels of the picture that regions are drawn on
