@@ -51,7 +51,9 @@ def _one_scene(
     from ..renderers import open_renderer
     from ..scenes import open_scene
 
-    choice = chosen_camera(args).at_full_size()
+    choice = chosen_camera(args)
+    if args.output is not None:  # lines alone need no larger picture
+        choice = choice.at_full_size()
     scene = taught_by(args.vocabulary)(open_scene(path))
     camera = choice.of(scene)
     with ProgressBar() as progress, open_renderer(args.backend) as renderer:
