@@ -17,7 +17,7 @@ from scipy.spatial import KDTree
 from torch import Tensor
 
 from langflash_core.at_once import at_once
-from langflash_core.geometry.cameras import invert_rigid, pictured, unproject
+from langflash_core.geometry.cameras import invert_rigid, pictured, world_points
 from langflash_core.geometry.harmonics import colour_to_sh, sh_to_colour
 from langflash_core.scene.consistency import outvoted, seen_through
 from langflash_core.scene.ownership import filled, owned
@@ -57,7 +57,8 @@ def _colours(scene: Scene, whole: Scene) -> Float[Tensor, "n 3"]:
         return solved_colours(whole.gaussians, (start - low) / (high - low), camera, picture)
 
     sums, seen = torch.zeros_like(start), start.new_zeros(len(start), 1)
-    for found in at_once(solved, range(scene.num_views)):
+    assert scene.view_ids is not None
+    for found in at_once(solved, scene.view_ids[scene.view_ids >= 0].unique().tolist()):
         sums += found.seen[:, None] * found.colours
         seen += found.seen[:, None]
     mean = low + (high - low) * sums / seen.clamp_min(_SEEN)
@@ -85,17 +86,20 @@ def _drawn(
 def fused_rows(scene: Scene) -> Bool[Tensor, " N"]:
     """Which Gaussians of a scene of layers make one surface; all that no photo made are among them."""
     assert scene.view_ids is not None
-    depths, alphas = _own_depths(scene)
-    keep = covering(depths, scene.viewmats.float(), scene.Ks.float(), alphas >= _SHOWN, alphas)
-    width, height = scene.view_size
-    rows = scene.view_ids < 0
-    for view in range(scene.num_views):
+    rows, (width, height) = scene.view_ids < 0, scene.view_size
+    views = scene.view_ids[~rows].unique()  # the others have no layer, and say nothing of those that have one
+    if not len(views):
+        return rows
+    depths, alphas = _own_depths(scene, views.tolist())
+    viewmats, Ks = scene.viewmats[views].float(), scene.Ks[views].float()
+    keep = covering(depths, viewmats, Ks, alphas >= _SHOWN, alphas)
+    for number, view in enumerate(views.tolist()):
         own = (scene.view_ids == view).nonzero().squeeze(1)
         points = scene.gaussians.means[own].float().T.contiguous()
         x, y, _ = pictured(scene.viewmats[view].float(), scene.Ks[view].float(), points)
         column = x.nan_to_num(0).floor().long().clamp(0, width - 1)
         line = y.nan_to_num(0).floor().long().clamp(0, height - 1)
-        rows[own] = keep[view][line, column]
+        rows[own] = keep[number][line, column]
     return rows
 
 
@@ -132,8 +136,8 @@ def told_in_layers(
     return found
 
 
-def _own_depths(scene: Scene) -> tuple[Float[Tensor, "V H W"], Float[Tensor, "V H W"]]:
-    """Depth and alpha of each layer from its own photo's place; where it shows nothing, 1 and 0."""
+def _own_depths(scene: Scene, views: list[int]) -> tuple[Float[Tensor, "L H W"], Float[Tensor, "L H W"]]:
+    """Depth and alpha of some layers from their own photos' places; where one shows nothing, 1 and 0."""
 
     def seen(view: int) -> tuple[Tensor, Tensor]:
         layer, camera = scene.layer(view), scene.camera(view)
@@ -141,7 +145,7 @@ def _own_depths(scene: Scene) -> tuple[Float[Tensor, "V H W"], Float[Tensor, "V 
         there = alpha >= _SHOWN
         return torch.where(there, depth, 1.0), torch.where(there, alpha, 0.0)
 
-    depths, alphas = zip(*at_once(seen, range(scene.num_views)), strict=True)
+    depths, alphas = zip(*at_once(seen, views), strict=True)
     return torch.stack(depths), torch.stack(alphas)
 
 
@@ -157,9 +161,7 @@ def covering(
     Args:
         depths: (V, H, W) > 0. usable: where they show something. trusts: how sure they are, in [0, 1].
     """
-    poses = invert_rigid(viewmats)
-    pos_c = unproject(depths, Ks).flatten(1, 2)
-    points = pos_c @ poses[:, :3, :3].transpose(1, 2) + poses[:, None, :3, 3]
+    points = world_points(depths, viewmats, Ks)
     through = seen_through(points.flatten(0, 1), viewmats, Ks, depths, trusts).view_as(usable)
     between = outvoted(points, viewmats, Ks, depths)
     keep = owned(depths, viewmats, Ks, usable & ~through & ~between)

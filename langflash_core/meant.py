@@ -13,7 +13,7 @@ from langflash_core.language.gaussians import gaussian_relevance
 from langflash_core.language.looks import lab, room_white
 from langflash_core.language.narrowing import Sight, choose, likely, viewer_axes
 from langflash_core.language.relevance import CompiledQuery
-from langflash_core.scene.instances import connected
+from langflash_core.scene.instances import parts_of
 from langflash_core.scene.thin import covered_areas
 from langflash_core.scene.world import upward
 from langflash_core.types import Scene
@@ -65,5 +65,5 @@ def _sight(scene: Scene) -> Sight:
         relevance={},
         limit=1.0,
         likely=1.0,
-        parts=lambda members: connected(scene.gaussians, members)[0],
+        parts=lambda members: parts_of(scene, members)[0],
     )

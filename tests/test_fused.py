@@ -28,6 +28,13 @@ def test_its_colours_make_the_pictures_of_all_layers():
         assert abs(float(drawn[SIZE // 4 : -SIZE // 4, SIZE // 4 : -SIZE // 4].mean()) - grey) < 0.15
 
 
+def test_a_photo_without_a_layer_says_nothing():
+    """Two more photos, whose layers a scene of many photos leaves out: the same rows as without them."""
+    scene = layered([(2, 0.2, 0), (2, 0.8, 1)], [0, 0.2])
+    more = replace(scene, viewmats=scene.viewmats[[0, 1, 1, 1]], Ks=scene.Ks[[0, 1, 1, 1]])
+    assert torch.equal(fused_rows(more), fused_rows(scene))
+
+
 def test_what_no_photo_made_stays():
     scene = layered([(2, 0.2, 0), (2, 0.8, 1)], [0, 0.2])
     assert scene.view_ids is not None

@@ -149,6 +149,19 @@ def rotation_angle_degrees(
 _SAMPLES = 1000  # points that tell the median distance
 
 
+def world_points(
+    depths: Float[Tensor, "V H W"], viewmats: Float[Tensor, "V 4 4"], Ks: Float[Tensor, "V 3 3"]
+) -> Float[Tensor, "V HW 3"]:
+    """Points in the world of depth maps, row by row, in their unit.
+
+    Args:
+        depths: z of the cameras. viewmats: world to camera. Ks: pixels.
+    """
+    poses = invert_rigid(viewmats)
+    pos_c = unproject(depths, Ks).flatten(1, 2)
+    return pos_c @ poses[:, :3, :3].transpose(1, 2) + poses[:, None, :3, 3]
+
+
 def median_distance(points: Float[Tensor, "N 3"], viewmat: Float[Tensor, "4 4"]) -> float:
     """Median, of some points in the world from a camera's place; 1 where there is none."""
     some = points[:: max(1, len(points) // _SAMPLES)].detach().cpu().double()

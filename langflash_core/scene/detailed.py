@@ -15,7 +15,7 @@ from torch import Tensor
 from torch.nn import functional as F
 
 from langflash_core.detail import Detail
-from langflash_core.geometry.cameras import invert_rigid, unproject
+from langflash_core.geometry.cameras import world_points
 from langflash_core.memory import give_back
 from langflash_core.scene.assemble import (
     directed,
@@ -197,17 +197,10 @@ def _kept(prediction: Prediction, views: Views, strangers: Tensor | None) -> tup
     usable = torch.isfinite(prediction.depths) & (prediction.depths > 0)
     middle = prediction.depths[usable].median() if bool(usable.any()) else torch.tensor(1.0)
     depths = torch.where(usable, prediction.depths, middle)
-    points = _points(depths[:1], prediction.viewmats[:1], views.Ks[:1].to(depths))[0]
+    points = world_points(depths[:1], prediction.viewmats[:1], views.Ks[:1].to(depths))[0]
     nowhere = torch.where(usable[0].flatten()[:, None], points, torch.nan)
     unit = mean_distance(nowhere, prediction.viewmats[0])
     return depths, usable if strangers is None else usable & ~strangers, unit
-
-
-def _points(depths: Tensor, viewmats: Tensor, Ks: Tensor) -> Tensor:
-    """(V, H W, 3) in the world."""
-    poses = invert_rigid(viewmats)
-    pos_c = unproject(depths, Ks).flatten(1, 2)
-    return pos_c @ poses[:, :3, :3].transpose(1, 2) + poses[:, None, :3, 3]
 
 
 def _trees(

@@ -49,10 +49,17 @@ def things(scene: Scene, members: Bool[np.ndarray, " N"]) -> Integer[np.ndarray,
     Parts a and b are one where the photo of b's layer shows, at the pixels of b and within `SAME` of their
     depth, at least `_SHOWN` of the smaller one's surface of a.
     """
+    return _numbered(*parts_of(scene, members))
+
+
+def parts_of(
+    scene: Scene, members: Bool[np.ndarray, " N"]
+) -> tuple[Integer[np.ndarray, " N"], Float[np.ndarray, " N"]]:
+    """`connected` of a scene; of one of layers, what several of them show has one number, as in `things`."""
     parts, radii = connected(scene.gaussians, members)
     if scene.layered and parts.max(initial=-1) > 0:
         parts = _as_one(scene, parts, radii)
-    return _numbered(parts, radii)
+    return parts, radii
 
 
 def _numbered(parts: Integer[np.ndarray, " N"], radii: Float[np.ndarray, " N"]) -> Integer[np.ndarray, " N"]:

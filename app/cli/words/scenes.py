@@ -90,7 +90,8 @@ def add_reconstruct(commands) -> None:
         "--refine",
         type=above_zero,
         metavar="SECONDS",
-        help="then fit poses and Gaussians to the photos, and keep that if a held-out view improves",
+        help="then fit poses and one surface of Gaussians, without layers, to the photos, and keep that if a "
+        "held-out view improves",
     )
     lens = command.add_mutually_exclusive_group()
     lens.add_argument("--fov", type=open_fov, metavar="DEG", help="field of view of the photos' longer side")
