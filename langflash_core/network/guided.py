@@ -16,7 +16,6 @@ from torch import Tensor
 from torch.nn import functional as F
 
 from langflash_core.geometry.cameras import rays
-from langflash_core.geometry.vantage import leading
 from langflash_core.keeping import MATCHES
 from langflash_core.memory import give_back
 from langflash_core.network.encoders.deeplab import DeepLab
@@ -41,18 +40,19 @@ from langflash_core.network.semantics.naming import PartNamer, describe, places
 from langflash_core.network.semantics.second import SecondHead, both, looked_at
 from langflash_core.network.semantics.splitting import condensed, joint_maps, split_groups, split_maps
 from langflash_core.network.stereo.adjustment import Sought
-from langflash_core.network.stereo.agreement import agreed, met
+from langflash_core.network.stereo.agreement import agreed
 from langflash_core.network.stereo.alignment import Correction
 from langflash_core.network.stereo.inputs import grown
 from langflash_core.network.stereo.keypoints import KeyPoints, decoded, match_photos, match_sources
 from langflash_core.network.stereo.partners import partners
 from langflash_core.network.stereo.planes import flattened
+from langflash_core.network.stereo.planesweep import searched
 from langflash_core.network.stereo.poses import PoseInput, Poses, estimate_poses, on_other_maps
 from langflash_core.network.stereo.prior import DepthHead, DepthMaps
 from langflash_core.network.stereo.registration import registered
 from langflash_core.network.stereo.retrieval import most_alike
 from langflash_core.network.stereo.sharpening import sharpened
-from langflash_core.network.stereo.sweep import DepthRefiner, everyone
+from langflash_core.network.stereo.sweep import DepthRefiner
 from langflash_core.running import Run
 from langflash_core.types import Gaussians, Views
 
@@ -286,10 +286,7 @@ class GuidedDepthNet(LangFlashNet):
             maps = self._refine(images, tokens, local, prior, poses, viewmats, Ks)
             sharp = _one_by_one(sharpened, maps.log_depths, images[0])
             maps = replace(maps, log_depths=in_groups(flattened, sharp, maps.log_errors))
-            agreed_maps = _agreed(maps, views, poses, viewmats[0], Ks[0], run)
-            if agreed_maps is not maps:  # what moved lies beside its edges
-                sharp = _one_by_one(sharpened, agreed_maps.log_depths, images[0])
-                maps = _met(replace(agreed_maps, log_depths=sharp), poses, viewmats[0], Ks[0])
+            maps = _agreed(maps, images[0], views, poses, viewmats[0], Ks[0], run)
         if not elements:
             return _geometry(Gaussians.none(), maps, poses, viewmats[0], Ks[0], views)
         with run.stage("Gaussians"):
@@ -349,47 +346,32 @@ def _one_by_one(work: Callable[..., Tensor], *of_views: Tensor) -> Tensor:
     return torch.cat([work(*own) for own in zip(*(values.split(1) for values in of_views), strict=True)])
 
 
-def _agreed(maps: DepthMaps, views: Views, poses: Poses, viewmats: Tensor, Ks: Tensor, run: Run) -> DepthMaps:
-    """Maps (V, H, W); those of known pose show one surface, to a fraction of the photos' pixels."""
+def _agreed(
+    maps: DepthMaps, images: Tensor, views: Views, poses: Poses, viewmats: Tensor, Ks: Tensor, run: Run
+) -> DepthMaps:
+    """Maps (V, H, W); those of known pose show one surface, to a fraction of the photos' pixels, and what the
+    maps had missed."""
     placed = [v for v in range(len(viewmats)) if v not in poses.guessed]
     if len(placed) < 2:
         return maps
     part = DepthMaps(maps.log_depths[placed], maps.log_errors[placed])
-    near = partners(part.log_depths, viewmats[placed], Ks[placed])
-    part = agreed(part, viewmats[placed], Ks[placed], near)
+    cameras = viewmats[placed], Ks[placed]
+    near = partners(part.log_depths, *cameras)
+    part = agreed(part, *cameras, near)
     photos = _greys(views)
+    greys = [photos[v] for v in placed]
+    logs = searched(part.log_depths, greys, *cameras, near, run.check)
+    part = replace(part, log_depths=_one_by_one(sharpened, logs, images[placed]))
     told = run.counted("refinement", "photo", range(len(placed)), _SWEPT)
 
     def each(view: int, make: Callable[[], Tensor]) -> Tensor:
         next(told)
         found = run.kept(f"depth-{view}", lambda: {"log_depths": make().cpu().numpy()})
-        return torch.from_numpy(np.array(found["log_depths"])).to(part.log_depths)
+        return torch.from_numpy(np.array(found["log_depths"])).to(logs)
 
-    whole = leading(part.depths, viewmats[placed])
-    greys = [photos[v] for v in placed]
-    part = registered(part, greys, viewmats[placed], Ks[placed], near, run.check, each, whole)
-    part = replace(part, log_depths=in_groups(flattened, part.log_depths, part.log_errors))
     log_depths = maps.log_depths.clone()
-    log_depths[placed] = part.log_depths
-    return replace(maps, log_depths=log_depths)
-
-
-def _met(maps: DepthMaps, poses: Poses, viewmats: Tensor, Ks: Tensor) -> DepthMaps:
-    """Maps (V, H, W); those of three photos of known pose and more lie on each other, of many on those of
-    their partners and of the photos that lead, which have most surfaces."""
-    placed = [v for v in range(len(viewmats)) if v not in poses.guessed]
-    if len(placed) < 3:
-        return maps
-    logs, cameras = maps.log_depths[placed], (viewmats[placed], Ks[placed])
-    near = everyone(len(placed))
-    if len(placed) > FEW:
-        first = leading(logs.exp(), cameras[0])
-        near = [
-            [*of, *(v for v in first if v not in (own, *of))]
-            for own, of in enumerate(partners(logs, *cameras))
-        ]
-    log_depths = maps.log_depths.clone()
-    log_depths[placed] = met(logs, *cameras, near)
+    part = registered(part, greys, *cameras, near, run.check, each)
+    log_depths[placed] = in_groups(flattened, part.log_depths, part.log_errors)
     return replace(maps, log_depths=log_depths)
 
 

@@ -12,7 +12,6 @@ from langflash_core.network.stereo.agreement import (
     blended,
     carried,
     knot_weights,
-    met,
     straightened,
 )
 from langflash_core.network.stereo.prior import DepthMaps
@@ -68,25 +67,6 @@ def test_the_surer_photo_counts_more():
     inside = (slice(8, -8), slice(24, -8))
     assert (mean[0] - logs[0])[inside].abs().max() < 0.002  # 1 / (1 + e^4) of .03
     assert (mean[1] - logs[1])[8:-8, 8:-24].abs().max() < 0.002
-
-
-@pytest.mark.parametrize("passed_on", [False, True])
-def test_all_that_see_a_place_take_the_same_mean(passed_on):
-    """Three maps, of which the third is farther by more than one surface asks for; and where the first and
-    the third know of each other only by the second, which lies between."""
-    logs, viewmats = _wall()
-    moved = torch.stack((logs[0], logs[1] + 0.03, logs[0] + (0.05 if passed_on else 0.2)))
-    near = [[1], [0, 2], [1]] if passed_on else everyone(3)
-    found = met(moved, viewmats[[0, 1, 0]], K.expand(3, 3, 3), near)
-    inside = (slice(8, -8), slice(24, -8))
-    # 0, .03, .05 become .015, .0267, .04 and then .0208, .0272, .0333; a bilinear map is off by 2e-4, twice.
-    own, gap = (0.0208, 0.0064) if passed_on else (0.015, 0.0)
-    assert (_gap(found[:2], viewmats).median() - gap).abs() < 4e-4
-    assert (found[0] - logs[0] - own)[inside].abs().max() < 1e-3
-    if passed_on:
-        assert (found[2] - found[0] - 0.0125)[inside].abs().max() < 1e-3
-    else:
-        assert (found[2] - moved[2])[inside].abs().max() < 1e-9
 
 
 def test_what_hides_something_else_stays():

@@ -15,8 +15,8 @@ from langflash_core.network.stereo.registration import (
     _TEXTURE,
     _Known,
     _Matches,
-    _smooth,
     _triangulated,
+    smooth,
 )
 from tests.network.test_registration import poses
 
@@ -94,14 +94,14 @@ def test_smooth_is_the_dense_solution(size):
                 dense[[i, j], [j, i]] -= tie
     right = target.double().flatten().numpy()
     off = np.linalg.norm(
-        _smooth(target, weight, logs, guide).flatten().numpy() - np.linalg.solve(dense, right)
+        smooth(target, weight, logs, guide).flatten().numpy() - np.linalg.solve(dense, right)
     )
     assert off <= 1e-3 * np.linalg.norm(right) / own + 1e-7
 
 
 def test_smooth_of_nothing_is_nothing():
     nothing = torch.zeros(5, 7)
-    assert torch.equal(_smooth(nothing, nothing, torch.rand(5, 7), np.zeros((5, 7), np.float32)), nothing)
+    assert torch.equal(smooth(nothing, nothing, torch.rand(5, 7), np.zeros((5, 7), np.float32)), nothing)
 
 
 def test_smooth_does_not_cross_a_jump():
@@ -110,7 +110,7 @@ def test_smooth_does_not_cross_a_jump():
     logs[:, 5:] = 0.4
     weight = torch.zeros(8, 10)
     weight[:, :3] = 100
-    found = _smooth(0.05 * weight, weight, logs, np.full((8, 10), 77, np.float32))
+    found = smooth(0.05 * weight, weight, logs, np.full((8, 10), 77, np.float32))
     assert found[:, 5:].abs().max() < 1e-12
     assert found[:, 4].min() > 0.01, "what is not seen moves along"
 
@@ -125,7 +125,7 @@ def test_smooth_is_cut_at_an_edge_of_the_photo():
     for far, share in ((60, 1.0), (120, registration._ACROSS)):
         guide = np.full((8, 10), 60, np.float32)
         guide[:, 5:] = far
-        found = _smooth(off * weight, weight, torch.zeros(8, 10), guide)
+        found = smooth(off * weight, weight, torch.zeros(8, 10), guide)
         falls.append(found[:, 4] - found[:, 5])
         tie = share * _STIFF
         expected = 0.05 / (2 / 300 + 4 / _STIFF + 1 / tie) / tie

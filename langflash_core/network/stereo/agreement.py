@@ -27,7 +27,6 @@ _SCALE = 0.04  # relative difference from which a pixel speaks less and less (Ge
 _INDEPENDENT = 200  # pixels go together: all compared ones count as this many a view
 _EXPECTED = 0.075  # of a knot, where nothing is compared
 _BEND = 0.06  # of a knot against its neighbour
-_MEETINGS = 2  # rounds: .0372 of error of 16 maps (900000000) becomes .0359, .0356, .0357
 _SAME = 0.06  # maps that differ by less, relatively, show one surface
 
 
@@ -65,21 +64,6 @@ def agreed(
     near = neighbours or everyone(len(logs))
     logs = blended(straightened(logs, viewmats, Ks, near), maps.log_errors, viewmats, Ks, near)
     return DepthMaps(logs, maps.log_errors)
-
-
-def met(
-    log_depths: Float[Tensor, "V H W"],
-    viewmats: Float[Tensor, "V 4 4"],
-    Ks: Float[Tensor, "V 3 3"],
-    neighbours: Neighbours,
-) -> Float[Tensor, "V H W"]:
-    """Log depths (V, H, W) that lie on each other where they show one surface: nothing is bent, and each says
-    as much, so that all photos which see a place take the same mean. Twice: the means of those that do not
-    see the same photos differ. Arguments and source as `agreed`.
-    """
-    for _ in range(_MEETINGS):
-        log_depths = blended(log_depths, torch.zeros_like(log_depths), viewmats, Ks, neighbours)
-    return log_depths
 
 
 def carried(

@@ -9,10 +9,6 @@ problem). It counts by how sure it is (there and back, same brightness) and by h
 for a change of depth. A smooth correction of log depth takes it over, cut where depth jumps and where the
 photo has an edge (one sparse linear system a view).
 
-Flow ends at half of the pictures' size. So many photos are halved first and it goes on to their last pixel:
-the same flow, and a quarter of the pixels that it is judged at. Their first round ends at a quarter. Those of
-them whose surfaces count most are compared whole, as few photos are.
-
 Sizes: V views, H W pixels of the maps, h w pixels of the photos.
 
 Source: own derivation; flow: Kroeger, Timofte, Dai, Van Gool 2016, "Fast Optical Flow using Dense Inverse
@@ -20,8 +16,8 @@ Search", of OpenCV.
 """
 
 import math
-from collections.abc import Callable, Collection, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from functools import lru_cache, partial
 from typing import Any
 
@@ -35,7 +31,6 @@ from torch import Tensor
 from torch.nn import functional as F
 
 from langflash_core.geometry.cameras import invert_rigid, pictured, unproject
-from langflash_core.network.many import FEW
 from langflash_core.network.stereo.prior import DepthMaps
 from langflash_core.network.stereo.sweep import Neighbours, everyone
 
@@ -51,7 +46,7 @@ _BRIGHTNESS = 10.0  # of 255, difference that is still the same
 _CHANCE = 0.03  # mean certainty of what a neighbour sees, below which it shows something else
 _TEXTURE = 2.0  # squared grey values a pixel, of gradient along a shift at which flow is half as sure
 _FLAT = 0.1  # of that, noise
-_ONE_SHIFT = 10  # cells of the maps: flow finds one shift for 16 x 16 pixels and more
+ONE_SHIFT = 10  # cells of the maps: flow finds one shift for 16 x 16 pixels and more
 _FARTHEST = 0.3  # log depth that a match may ask for
 _EXPECTED = 0.15  # log depth, what the maps may be off
 _ALIKE = 50  # cells that are off together: errors of the maps are slow
@@ -60,34 +55,8 @@ _JUMP = 0.03  # log depth between cells from which it is cut
 _EDGE = 5.0  # of 255, difference of brightness between cells from which it is cut
 _ACROSS = 0.02  # what is left of it there: most edges are drawn on one surface
 _ITERATIONS = 250
-_STRIDE, _DESCENTS = 5, 8  # of flow between many photos: pixels from patch to patch, steps of each
 _AT_HAND = 64  # pictures of one size that are kept
 _MARGIN = 1.0  # pixels at the border that say nothing
-
-
-@dataclass(frozen=True)
-class _Care:
-    """How two pictures are compared. flow_error, there_and_back: their pixels. quick: flow from fewer
-    patches, with fewer steps. finest: halvings of the pictures at which flow ends."""
-
-    flow_error: float = _FLOW_ERROR
-    there_and_back: float = _THERE_AND_BACK
-    quick: bool = False
-    finest: int = 1
-
-    def flow(self) -> cv2.DISOpticalFlow:
-        flow = cv2.DISOpticalFlow.create(cv2.DISOPTICAL_FLOW_PRESET_MEDIUM)
-        if self.quick:
-            flow.setPatchStride(_STRIDE)
-            flow.setGradientDescentIterations(_DESCENTS)
-        flow.setFinestScale(self.finest)
-        return flow
-
-
-_WHOLE = _Care()
-"""Of few photos; many are halved, for the first round and for the others."""
-_COARSE = _Care(there_and_back=2.0, quick=True)
-_FINE = _Care(flow_error=_FLOW_ERROR / 2, there_and_back=1.5, quick=True, finest=0)
 
 
 @dataclass(frozen=True)
@@ -144,7 +113,6 @@ def registered(
     neighbours: Neighbours | None = None,
     check: Callable[[], None] = lambda: None,
     each: Callable[[int, Callable[[], Tensor]], Tensor] = lambda view, make: make(),
-    leading: Collection[int] = (),
 ) -> DepthMaps:
     """Maps (V, H, W) whose surfaces show the same in neighbouring photos; the expected errors stay.
 
@@ -154,25 +122,19 @@ def registered(
         neighbours: of each view, the best first; None: all others.
         check: called before each comparison; what it raises ends the work.
         each: gives the map (H, W) of a view, which it may have made, or know already.
-        leading: of many photos those that are compared whole.
     """
     logs = maps.log_depths
     near = neighbours or everyone(len(logs))
     cells = (logs.shape[1], logs.shape[2])
     height, width = (min(_LARGEST * g, max(p, g)) for p, g in zip(photos[0].shape, cells, strict=True))
-    size, half = (height, width), (height // 2, width // 2)
-    if min(size) < _SMALLEST:
+    if min(height, width) < _SMALLEST:
         return maps
-    guides = [_resized(photo, cells).astype(np.float32) for photo in photos]
-    halved = len(logs) > FEW and min(half) >= _SMALLEST
-    whole, coarse = (_Pictures.of(photos, *of, Ks, cells) for of in ((size, _WHOLE), (half, _COARSE)))
-    fine = replace(coarse, care=_FINE)
+    guides = [resized(photo, cells).astype(np.float32) for photo in photos]
+    pictures = _Pictures.of(photos, (height, width), Ks, cells)
 
     def corrected(view: int) -> Tensor:
         own, others = logs[view].cpu(), near[view]
-        of_rounds = (coarse, fine) if halved and view not in leading else (whole, whole)
-        rounds = zip(_ROUNDS, of_rounds, strict=True) if len(others) > 1 else [(1, of_rounds[-1])]
-        for partners, pictures in rounds:
+        for partners in _ROUNDS if len(others) > 1 else (1,):
             target, weight = torch.zeros(2, *cells)
             depths = F.interpolate(own[None, None], size=pictures.size, mode="bilinear")[0, 0]
             known = _Known.of(pictures.grey(view))
@@ -182,7 +144,7 @@ def registered(
                 change, counts = pictures.compared(view, other, depths, known, pose)
                 target += _cells(counts * change, cells)
                 weight += _cells(counts, cells)
-            own = own + _smooth(target, weight, own, guides[view])
+            own = own + smooth(target, weight, own, guides[view])
         return own.to(logs)
 
     found = [each(view, partial(corrected, view)) for view in range(len(logs))]
@@ -191,22 +153,20 @@ def registered(
 
 @dataclass(frozen=True)
 class _Pictures:
-    """Photos (h, w) uint8 of one size, by their numbers, their intrinsics (V, 3, 3) there, and how they are
-    compared."""
+    """Photos (h, w) uint8 of one size, by their numbers, and their intrinsics (V, 3, 3) there."""
 
     grey: Callable[[int], np.ndarray]
     size: tuple[int, int]
     Ks: Tensor
-    care: _Care
 
     @staticmethod
     def of(
-        photos: Sequence[np.ndarray], size: tuple[int, int], care: _Care, Ks: Tensor, cells: tuple[int, int]
+        photos: Sequence[np.ndarray], size: tuple[int, int], Ks: Tensor, cells: tuple[int, int]
     ) -> "_Pictures":
         """Ks: pixels of maps of so many cells."""
         ratio = torch.tensor([size[1] / cells[1], size[0] / cells[0], 1.0])
-        grey = lru_cache(_AT_HAND)(lambda view: _resized(photos[view], size))
-        return _Pictures(grey, size, Ks.cpu() * ratio[:, None], care)
+        grey = lru_cache(_AT_HAND)(lambda view: resized(photos[view], size))
+        return _Pictures(grey, size, Ks.cpu() * ratio[:, None])
 
     def compared(
         self, view: int, other: int, depths: Tensor, known: _Known, pose: Tensor
@@ -214,12 +174,13 @@ class _Pictures:
         """Changes of log depth (h, w) that another photo asks for, and what each counts; depths: log, (h,
         w)."""
         greys, Ks = (self.grey(view), self.grey(other)), (self.Ks[view], self.Ks[other])
-        matches = _matched(depths, *greys, *Ks, pose, self.care, known)
+        matches = _matched(depths, *greys, *Ks, pose, known)
         change, moved = _triangulated(depths, matches, *Ks, pose, known)
-        return change, torch.from_numpy(matches.sure) * moved / (self.care.flow_error**2 * _ONE_SHIFT)
+        return change, torch.from_numpy(matches.sure) * moved / (_FLOW_ERROR**2 * ONE_SHIFT)
 
 
-def _resized(photo: np.ndarray, size: tuple[int, int]) -> np.ndarray:
+def resized(photo: UInt8[np.ndarray, "h w"], size: tuple[int, int]) -> UInt8[np.ndarray, "H W"]:
+    """A photo at `size` = (H, W)."""
     if photo.shape == size:
         return photo
     method = cv2.INTER_AREA if size[0] < photo.shape[0] else cv2.INTER_CUBIC
@@ -237,7 +198,6 @@ def _matched(
     K: Tensor,
     other_K: Tensor,
     pose: Tensor,
-    care: _Care,
     known: _Known,
 ) -> _Matches:
     height, width = log_depths.shape
@@ -246,7 +206,7 @@ def _matched(
     seen = (z > 0) & (x > _MARGIN) & (y > _MARGIN) & (x < width - _MARGIN) & (y < height - _MARGIN)
     x, y = (np.where(seen, along, -1e4).astype(np.float32) for along in (x, y))
     brought = _looked_up(other, x - 0.5, y - 0.5)
-    flow = care.flow()
+    flow = cv2.DISOpticalFlow.create(cv2.DISOPTICAL_FLOW_PRESET_MEDIUM)
     none: Any = None  # begins with no flow, which OpenCV's stubs deny
     there, back = flow.calc(grey, brought, none), flow.calc(brought, grey, none)
     columns, rows = np.meshgrid(np.arange(width, dtype=np.float32), np.arange(height, dtype=np.float32))
@@ -256,7 +216,7 @@ def _matched(
     differs = _looked_up(brought, columns, rows).astype(np.float32) - grey
     differs -= cv2.blur(differs, (15, 15))
     differs = cv2.blur(np.square(differs), (5, 5))
-    sure = 1 / (1 + missed / care.there_and_back**2) ** 2 / (1 + differs / _BRIGHTNESS**2)
+    sure = 1 / (1 + missed / _THERE_AND_BACK**2) ** 2 / (1 + differs / _BRIGHTNESS**2)
     inside = seen & (_looked_up(seen.astype(np.float32), columns, rows, cv2.BORDER_CONSTANT) > 0.999)
     sure = np.where(inside, sure, 0.0)
     if sure.sum() < _CHANCE * seen.sum():
@@ -305,7 +265,7 @@ def _turned_back(vectors: list[Tensor], pose: Tensor) -> list[np.ndarray]:
     return [(cosine * x + sine * y).numpy(), (cosine * y - sine * x).numpy()]
 
 
-def _smooth(target: Tensor, weight: Tensor, log_depths: Tensor, guide: np.ndarray) -> Tensor:
+def smooth(target: Tensor, weight: Tensor, log_depths: Tensor, guide: np.ndarray) -> Tensor:
     """The correction x (H, W) that minimises sum w (x - t)^2 + x^2 / s^2 + sum g (x_i - x_j)^2 over cells and
     their neighbours, g cut where depth jumps or is no number, and at edges of the guide (H, W), the photo in
     cells; target: w t."""
