@@ -34,13 +34,13 @@ def draw(state: State, look: Look) -> list[do.Command]:
     flags = imgui.ChildFlags_.auto_resize_y | imgui.ChildFlags_.nav_flattened  # keys walk in and out
     imgui.set_next_window_size_constraints(ImVec2(0, 0), ImVec2(math.inf, room))
     imgui.begin_child("##form", ImVec2(0, 0), flags)
-    issued = _form(state, look)
+    issued, confirmed = _form(state, look)
     imgui.end_child()
-    return issued + _buttons(state, look)
+    return issued + _buttons(state, look, confirmed)
 
 
-def _form(state: State, look: Look) -> list[do.Command]:
-    """What is wanted, and the command that it is."""
+def _form(state: State, look: Look) -> tuple[list[do.Command], bool]:
+    """What is wanted, and the command that it is; the second value tells whether Enter has ended its path."""
     form = state.exporting.form
     wanted = _kinds(form, look)
     widgets.muted(form.what.tip)
@@ -50,10 +50,11 @@ def _form(state: State, look: Look) -> list[do.Command]:
     imgui.text("Where to write it")
     imgui.set_next_item_width(-widgets.folder_room())
     _, path = imgui.input_text("##file", wanted.path)
+    confirmed = widgets.confirmed()
     elsewhere: list[do.Command] = [opening.LookForPlace()] if widgets.folder_button() else []
     wanted = replace(wanted, path=path)
     issued: list[do.Command] = [] if wanted == form else [export.EditForm(wanted)]
-    return issued + elsewhere + _order(state, look)
+    return issued + elsewhere + _order(state, look), confirmed
 
 
 def _kinds(form: ExportForm, look: Look) -> ExportForm:
@@ -143,12 +144,12 @@ def _order(state: State, look: Look) -> list[do.Command]:
     return issued
 
 
-def _buttons(state: State, look: Look) -> list[do.Command]:
+def _buttons(state: State, look: Look, confirmed: bool) -> list[do.Command]:
     """What runs it, and what closes the dialog."""
     issued: list[do.Command] = []
     busy = state.exporting.running is not None
     imgui.begin_disabled(isinstance(written.order(state), str) or busy)
-    if widgets.primary_button("Export", look.vec(120, 0)):
+    if widgets.default_button("Export", look.vec(120, 0), confirmed):
         issued.append(export.Export())
     imgui.end_disabled()
     imgui.same_line()
@@ -171,7 +172,7 @@ def draw_replacing(state: State, look: Look) -> list[do.Command]:
         widgets.muted(f"and {len(there) - _NAMED} more")
     widgets.gap(look.px(4))
     issued: list[do.Command] = []
-    if widgets.primary_button("Replace it" if alone else "Replace them", look.vec(140, 0)):
+    if widgets.default_button("Replace it" if alone else "Replace them", look.vec(140, 0)):
         issued.append(export.Export(sure=True))
     imgui.same_line()
     if imgui.button("Choose another name", look.vec(190, 0)):

@@ -137,9 +137,9 @@ def _save(state: State, look: Look) -> list[do.Command]:
     consequence = f"{path} will be replaced." if exists else f"Writes {path}"
     widgets.muted("Type a file name." if path is None else consequence)
     imgui.begin_disabled(path is None)
-    pressed = widgets.primary_button("Replace" if exists else "Save", look.vec(120, 0))
+    pressed = widgets.default_button("Replace" if exists else "Save", look.vec(120, 0), confirmed)
     imgui.end_disabled()
-    if path is not None and (pressed or confirmed):
+    if path is not None and pressed:
         issued.append(show.SaveScene(path))
     return issued
 
@@ -165,9 +165,9 @@ def _file(
     issued, confirmed = _path_field(state, label)
     text = state.typed.text.strip()
     imgui.begin_disabled(not text)
-    pressed = widgets.primary_button(verb, look.vec(120, 0))
+    pressed = widgets.default_button(verb, look.vec(120, 0), confirmed)
     imgui.end_disabled()
-    if text and (pressed or confirmed):
+    if text and pressed:
         issued.append(make(typed_path(text)))
     return issued
 
@@ -180,7 +180,7 @@ def _path_field(state: State, label: str, place: bool = False) -> tuple[list[do.
     if imgui.is_window_appearing():
         imgui.set_keyboard_focus_here()
     changed, path = imgui.input_text("##path", state.typed.text)
-    confirmed = imgui.is_item_deactivated() and imgui.is_key_pressed(imgui.Key.enter)
+    confirmed = widgets.confirmed()
     issued: list[do.Command] = [do.EditDialogPath(path)] if changed else []
     if place and widgets.folder_button():
         issued.append(opening.LookForPlace())
@@ -255,13 +255,13 @@ def _help_group(group: str | None, look: Look, room: float) -> None:
 def _leave(state: State, look: Look) -> list[do.Command]:
     imgui.text_wrapped("The scene is not saved.")
     issued: list[do.Command] = []
-    if widgets.primary_button("Save first", look.vec(120, 0)):
-        issued.append(do.ShowDialog(Dialog.SAVE))
-    widgets.beside(look.px(120))
-    if imgui.button("Leave", look.vec(120, 0)):
+    if widgets.default_button("Save and quit", look.vec(140, 0)):
+        issued.append(show.SaveFirst())
+    widgets.beside(look.px(180))
+    if imgui.button("Quit without saving", look.vec(180, 0)):
         issued.append(do.Leave(sure=True))
-    widgets.beside(look.px(120))
-    if imgui.button("Stay", look.vec(120, 0)):
+    widgets.beside(look.px(110))
+    if imgui.button("Cancel", look.vec(110, 0)):
         issued.append(do.ShowDialog(None))
     return issued
 

@@ -34,8 +34,7 @@ def _field(text: str) -> tuple[str, int, bool]:
         imgui.set_keyboard_focus_here()
     imgui.set_next_item_width(-1)
     _, text = imgui.input_text_with_hint("##command", "what to do", text, _FLAGS, lambda _: 0)
-    enter = imgui.is_key_pressed(imgui.Key.enter) or imgui.is_key_pressed(imgui.Key.keypad_enter)
-    entered = imgui.is_item_deactivated() and enter
+    entered = widgets.confirmed()
     down, up = (imgui.is_key_pressed(key) for key in (imgui.Key.down_arrow, imgui.Key.up_arrow))
     return text, int(down) - int(up), entered
 

@@ -157,9 +157,7 @@ def _files() -> Iterable[Entry]:
     yield Entry(
         "Clear the tray", group, lambda s: show.ClearPhotos() if s.scene.photos and not s.scene.job else None
     )
-    yield Entry(
-        "Leave", group, _always(do.Leave()), _ctrl("q"), fa.ICON_FA_RIGHT_FROM_BRACKET, in_fields=True
-    )
+    yield Entry("Quit", group, _always(do.Leave()), _ctrl("q"), fa.ICON_FA_RIGHT_FROM_BRACKET, in_fields=True)
 
 
 def _frames(state: State) -> do.Command | None:

@@ -52,7 +52,7 @@ def _path(state: State) -> tuple[list[do.Command], bool]:
         imgui.set_keyboard_focus_here()
     hint = _HINTS[state.dialog or Dialog.OPEN]
     changed, path = imgui.input_text_with_hint("##path", hint, state.typed.text)
-    confirmed = imgui.is_item_deactivated() and imgui.is_key_pressed(imgui.Key.enter)
+    confirmed = widgets.confirmed()
     return ([do.EditDialogPath(path)] if changed else []), confirmed
 
 
@@ -139,11 +139,7 @@ def _photo(state: State, path: Path, size: ImVec2, look: Look) -> list[do.Comman
 def _taken(state: State, path: Path) -> do.Command:
     """What a press on a file comes to: Enter opens it and what is chosen, the space bar and the mouse take it
     with the others."""
-    return _opened(state, (*state.opening.chosen, path)) if _enters() else opening.Choose(path)
-
-
-def _enters() -> bool:
-    return any(map(imgui.is_key_pressed, (imgui.Key.enter, imgui.Key.keypad_enter)))
+    return _opened(state, (*state.opening.chosen, path)) if widgets.enters() else opening.Choose(path)
 
 
 def _opened(state: State, paths: tuple[Path, ...]) -> do.Command:
@@ -165,7 +161,7 @@ def _buttons(state: State, confirmed: bool, look: Look) -> list[do.Command]:
     count, merging = len(chosen), state.dialog is Dialog.MERGE
     label = "Merge" if merging else "Open" if typed or count < 2 else f"Open {count} files"
     imgui.begin_disabled(not typed and not chosen)
-    pressed = widgets.primary_button(f"{label}###open", look.vec(140, 0))
+    pressed = widgets.default_button(f"{label}###open", look.vec(140, 0), confirmed)
     imgui.end_disabled()
     imgui.same_line()
     if imgui.button("Cancel", look.vec(110, 0)):
@@ -174,12 +170,12 @@ def _buttons(state: State, confirmed: bool, look: Look) -> list[do.Command]:
     widgets.beside(imgui.calc_text_size(told).x, look.px(14))
     imgui.align_text_to_frame_padding()
     imgui.text_colored(theme.MUTED, told)
-    if typed and (pressed or confirmed):
+    if typed and pressed:
         path = typed_path(typed)
-        walks = confirmed and not pressed and state.typed.there is There.FOLDER and typed.endswith(os.sep)
+        walks = confirmed and state.typed.there is There.FOLDER and typed.endswith(os.sep)
         merge_or_open = show.MergeScene(path) if merging else show.OpenPaths((str(path),))
         issued.append(opening.LookInto(path) if walks else merge_or_open)
-    elif chosen and (pressed or confirmed):
+    elif chosen and pressed:
         issued.append(_opened(state, chosen))
     return issued
 
@@ -188,13 +184,13 @@ def _place_buttons(state: State, confirmed: bool, look: Look) -> list[do.Command
     """Of the dialog for a folder to write to: the one that was typed, or the one on show."""
     folder, typed = state.opening.folder, state.typed.text.strip()
     imgui.begin_disabled(folder is None or bool(folder.problem and not typed))
-    pressed = widgets.primary_button("Write here", look.vec(140, 0))
+    pressed = widgets.default_button("Write here", look.vec(140, 0), confirmed)
     imgui.end_disabled()
     imgui.same_line()
     if imgui.button("Back", look.vec(110, 0)):
         return [opening.PlaceFound(None)]
     if typed and confirmed:
         return [opening.LookInto(typed_path(typed))]
-    if (pressed or confirmed) and folder is not None:
+    if pressed and folder is not None:
         return [opening.PlaceFound(typed_path(typed) if typed else folder.path)]
     return []

@@ -102,7 +102,7 @@ def _card(film: Film, index: int, still: Still, size: ImVec2, look: Look) -> lis
 def _buttons(film: Film, look: Look) -> list[do.Command]:
     issued: list[do.Command] = []
     imgui.begin_disabled(not film.chosen)
-    if widgets.primary_button(f"{fa.ICON_FA_CUBES}  Reconstruct", look.vec(150, 0)):
+    if widgets.default_button(f"{fa.ICON_FA_CUBES}  Reconstruct", look.vec(150, 0)):
         issued.append(opening.TakeFrames())
     imgui.end_disabled()
     imgui.same_line()

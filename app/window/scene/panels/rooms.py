@@ -63,7 +63,7 @@ def draw_drop(state: State, look: Look) -> list[do.Command]:
         known if state.scene.photos else "This room came from a file; its photos are not in the tray"
     )
     widgets.beside(look.px(130))
-    if widgets.primary_button("New room", look.vec(130, 0)):
+    if widgets.default_button("New room", look.vec(130, 0)):
         issued.append(show.dropped(state, state.scene.dropped, new=True))
     widgets.tooltip("Of these photos alone; the present room stays one click away")
     widgets.beside(look.px(110))
@@ -82,7 +82,7 @@ def draw_scene_drop(state: State, look: Look) -> list[do.Command]:
     widgets.muted(f"{state.scene.info.name} is open.")
     widgets.gap(look.px(4))
     issued: list[do.Command] = []
-    if widgets.primary_button("Open it", look.vec(130, 0)):
+    if widgets.default_button("Open it", look.vec(130, 0)):
         issued.append(show.Instead((show.OpenScene(path, alone=True),)))
     widgets.tooltip("The present scene stays one click away")
     widgets.beside(look.px(190))
@@ -103,7 +103,7 @@ def draw_unsaved(state: State, look: Look) -> list[do.Command]:
         imgui.text_wrapped("Discarded ones can be had back for a while: the room stays in the list of rooms.")
     widgets.gap(look.px(4))
     issued: list[do.Command] = []
-    if widgets.primary_button("Save ...", look.vec(120, 0)):
+    if widgets.default_button("Save ...", look.vec(120, 0)):
         issued.append(show.SaveFirst())
     widgets.beside(look.px(120))
     if imgui.button("Discard", look.vec(120, 0)):
