@@ -44,7 +44,7 @@ class Output:
     gaps in them may be filled. colours: by a colour map. every: it is of all photos' views, unless one is
     named.
 
-    beside: name of what is written beside each file, with its `{stem}`; with `{view}`, a file a view. keys:
+    beside: name of what is written beside each file, with its `{stem}`; with `{photo}`, a file a view. keys:
     of a .json of this kind, in its object or in every entry of its list.
     """
 
@@ -116,12 +116,15 @@ class Output:
         """`target`, or its file of each photo; `photos` as `files`."""
         if photos is None or not self.each:
             return (target,)
-        return tuple(target.with_name(f"{target.stem}_{view}{target.suffix}") for view in range(photos))
+        return tuple(
+            target.with_name(f"{target.stem}_{number}{target.suffix}") for number in range(1, photos + 1)
+        )
 
     def files_beside(self, file: Path, photos: int | None) -> tuple[Path, ...]:
         """What lies beside one of its own files; `photos` as `files`."""
-        count = (photos or 1) if "{view}" in self.beside else int(bool(self.beside))
-        return tuple(file.with_name(self.beside.format(stem=file.stem, view=view)) for view in range(count))
+        count = (photos or 1) if "{photo}" in self.beside else int(bool(self.beside))
+        numbers = range(1, count + 1)  # as people count photos
+        return tuple(file.with_name(self.beside.format(stem=file.stem, photo=number)) for number in numbers)
 
 
 def _splats(name: str, endings: tuple[str, ...], writer: str, reader: str, **more: Any) -> Output:
@@ -178,7 +181,7 @@ SEGMENTED = Output(
 COCO = Output(
     "coco", (".json",), "COCO masks", "Instance masks as COCO JSON, and the pictures they belong to",
     subject="answers", noun="a .json of masks", phrases="some", looks=True, every=True,
-    beside="{stem}_{view}.png", keys=("images", "annotations"),
+    beside="{stem}_{photo}.png", keys=("images", "annotations"),
     writer="writing.views:write_coco_masks", of_answer="export.coco:write_answer",
 )  # fmt: skip
 BOXES_JSON = Output(

@@ -90,7 +90,8 @@ class ExportRequest:
         words += ["--segmented"] if self.segmented else []
         for name in ("what", "threshold", "view", "camera", "size", "backend", "seconds", "path", "axes"):
             value = getattr(self, name)
-            words += [] if value is None else [f"--{name}", _said(value)]
+            said = value + 1 if name == "view" and value is not None else value  # people count from 1
+            words += [] if value is None else [f"--{name}", _said(said)]
         words += [] if self.colormap == COLOUR_MAPS[0] else ["--colormap", self.colormap]
         if self.span is not None:  # in one word where it begins like an option
             low_high = _said(self.span)

@@ -161,7 +161,7 @@ def _shares_line(shares: tuple[float, ...], names: Sequence[str]) -> str:
     some = [(share, view) for view, share in enumerate(shares) if share > 0]
     most = sorted(sorted(some, reverse=True)[:_NAMED], key=lambda one: one[1])
     apart = len(names) == len(set(names)) == len(shares) and all(0 < len(name) <= _SHORT for name in names)
-    called = names if apart else [f"photo {view}" for view in range(len(shares))]
+    called = names if apart else [f"photo {number}" for number in range(1, len(shares) + 1)]
     parts = [f"{max(1, round(100 * share))} % of {called[view]}" for share, view in most]
     return ", ".join(parts) + (f" and some of {_others(len(some) - _NAMED)}" if len(some) > _NAMED else "")
 

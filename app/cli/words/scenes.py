@@ -295,7 +295,7 @@ def add_export(commands) -> None:
     )
     add_colours(command)
     command.add_argument(
-        "--all-views", action="store_true", help="from every photo: FILE_0, FILE_1 and so on"
+        "--all-views", action="store_true", help="from every photo: FILE_1, FILE_2 and so on"
     )
     command.add_argument(
         "--with-text", action="store_true", help="an .html answers any phrase, and is 28 MB larger"
@@ -479,7 +479,7 @@ def add_level(commands) -> None:
         "--length",
         nargs=3,
         metavar=("A", "B", "METRES"),
-        help="from A to B it is so long; A and B are points X,Y,Z of the scene, or pixels VIEW:U,V of a "
+        help="from A to B it is so long; A and B are points X,Y,Z of the scene, or pixels PHOTO:U,V of a "
         "photo as the scene has it",
     )
     lengths.add_argument("--ceiling", type=above_zero, metavar="METRES", help="the ceiling is so high")

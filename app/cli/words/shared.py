@@ -12,10 +12,10 @@ from ..values import (
     film_time,
     gaussian_count,
     intrinsics,
+    photo_index,
     pixel_side,
     size,
     span,
-    view_index,
 )
 
 
@@ -102,7 +102,9 @@ def add_colours(command: argparse.ArgumentParser) -> None:
 def add_camera(command: argparse.ArgumentParser) -> None:
     """From where, and how large."""
     camera = command.add_mutually_exclusive_group()
-    camera.add_argument("--view", type=view_index, metavar="N", help="that photo's pose, from 0 (default: 0)")
+    camera.add_argument(
+        "--view", type=photo_index, metavar="N", help="that photo's pose, from 1 (default: 1)"
+    )
     camera.add_argument(
         "--camera", type=Path, metavar="FILE", help="JSON with viewmat (4 x 4), K (3 x 3), width and height"
     )
@@ -110,8 +112,7 @@ def add_camera(command: argparse.ArgumentParser) -> None:
         "--size",
         type=size,
         metavar="WxH",
-        help="pixels to draw (default: of pictures as many as the photo in the scene has; of boxes and "
-        "--segmented as the network saw it)",
+        help="pixels to draw (default: as many as the photo in the scene has)",
     )
     command.add_argument(
         "--ortho",

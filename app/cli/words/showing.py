@@ -3,7 +3,7 @@
 import re
 from pathlib import Path
 
-from ..values import point, view_index, whole_count
+from ..values import photo_index, point, whole_count
 from .shared import add_backend, add_json, new_actions, new_command
 
 SHELLS = ("bash", "zsh", "fish")
@@ -38,7 +38,9 @@ def _add_stop(actions) -> None:
     command = _changing(actions, "stop", "one more stop")
     command.add_argument("name", metavar="NAME")
     seen = command.add_mutually_exclusive_group()
-    seen.add_argument("--view", type=view_index, metavar="N", help="as a photo saw it, from 0 (default: 0)")
+    seen.add_argument(
+        "--view", type=photo_index, metavar="N", help="as that photo saw it, from 1 (default: 1)"
+    )
     seen.add_argument("--camera", type=Path, metavar="FILE", help="as of `langflash render --camera`")
     command.add_argument("--text", default="", metavar="TEXT", help="what is told there")
     command.add_argument("--phrase", default="", metavar="PHRASE", help="what is asked there")

@@ -37,7 +37,7 @@ def test_a_known_length_puts_metres_into_the_scene(run, room_file, tmp_path):
     assert load(out).record.metric_scale == pytest.approx(METRES, rel=0.02)
     done = run("level", room_file, "--length", "0,0,0", "0,0,1.5", "3", "--json")
     assert done.json()["metric_scale"] == pytest.approx(2.0)
-    done = run("level", room_file, "--length", "0:20,30", "0:70,30", "3", "--json")
+    done = run("level", room_file, "--length", "1:20,30", "1:70,30", "3", "--json")
     assert done.json()["metric_scale"] > 0
 
 
@@ -61,7 +61,8 @@ def test_an_upright_export_stands_level_in_metres_in_every_kind_of_file(run, roo
         (("--length", "0,0,0", "0,0,0", "2"), "one point"),
         (("--length", "0,0", "0,0,1", "2"), "points"),
         (("--length", "0,0,0", "0,0,1", "long"), "metres"),
-        (("--length", "9:1,1", "0,0,1", "2"), "no pixel"),
+        (("--length", "9:1,1", "0,0,1", "2"), "photos 1 to"),
+        (("--length", "0:1,1", "0,0,1", "2"), "photos count from 1"),
         (("--up", "0,0,0"), "no length"),
         (("--up", "0,1"), "three numbers"),
         (("--ceiling", "-1"), "above 0"),
