@@ -13,7 +13,7 @@ class Dialog(Enum):
     DROP = "Where do these photos belong?"
     DROP_SCENE = "Open or merge?"
     MERGE = "Merge a scene into this one"
-    PLACE = "Where to write it"
+    PLACE = "Choose a folder"
     FILM = "Frames of a film"
     UNSAVED = "Edits are not saved"
     SAVE_PROMPTS = "Save the phrases"

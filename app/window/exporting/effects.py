@@ -87,7 +87,7 @@ class ExportingEffects(Effects):
     def _export(self, state: State, sure: bool) -> None:
         perform = self._hands.perform
         if self._exporter.running:
-            perform(Notify("An export is under way; wait for it, or stop it."))
+            perform(Notify("An export is running; wait for it, or stop it."))
             return
         state = TargetLookedUp(look_up(state)).apply(state)
         wanted = order(state)

@@ -86,7 +86,7 @@ def _target(state: State) -> Path | str:
     if there.scene:
         return "This file is the scene itself; choose another name."
     if there.photo:
-        return "This would replace a photo of the tray; choose another name."
+        return "This would replace one of your photos; choose another name."
     return target
 
 
@@ -217,7 +217,7 @@ def _phrases(state: State) -> tuple[tuple[str, ...], str]:
         return asked, ""
     wanted = what.needs_phrases or (what.takes_phrases and state.exporting.form.only_found)
     if wanted and not asked:
-        return (), "There is no phrase to keep only the answers of; type one under Find first."
+        return (), "There is no phrase to export the answers of; type one under Find first."
     return (asked if wanted else ()), ""
 
 
@@ -238,11 +238,11 @@ def remarks(state: State) -> list[str]:
     if state.scene.info is not None and source(state) != state.scene.info.path:
         unsaved = "edits are" if state.editing.exported_anew else "scene is"
         why = "selection is" if form.only_selected and form.what.splats else unsaved
-        notes.append(f"The {why} not saved: the command reads a copy that goes when the window closes.")
+        notes.append(f"The {why} not saved: the command reads a copy that is deleted when the window closes.")
     if not (form.what.needs_phrases or form.only_found):
         return notes
     if form.what.phrases != "one" and len({prompt.threshold for prompt in state.asking.asked}) > 1:
         notes.append("The thresholds differ, so the calibrated one is used for all.")
     if state.asking.negatives:
-        notes.append("Phrases are compared with the usual ones, not with your own.")
+        notes.append("The export compares phrases with the default ones, not with your own.")
     return notes

@@ -47,7 +47,7 @@ def _form(state: State, look: Look) -> tuple[list[do.Command], bool]:
     widgets.gap(look.px(4))
     wanted = _options(state, wanted, look)
     widgets.gap(look.px(4))
-    imgui.text("Where to write it")
+    imgui.text("Save as")
     imgui.set_next_item_width(-widgets.folder_room())
     _, path = imgui.input_text("##file", wanted.path)
     confirmed = widgets.confirmed()
@@ -77,7 +77,7 @@ def _options(state: State, form: ExportForm, look: Look) -> ExportForm:
     if what.looks:
         _label("Seen from", look)
         count = len(state.scene.info.views) if state.scene.info else 0
-        options = (("the view on show", False), (f"all {count} photos' views", True))
+        options = (("this view", False), (f"all {count} photos", True))
         form = replace(form, all_views=widgets.choice(options, form.all_views))
     if what.sized:
         _label("Longer side", look)
@@ -98,7 +98,7 @@ def _options(state: State, form: ExportForm, look: Look) -> ExportForm:
         if changed:
             form = replace(form, seconds=float(round(seconds)))
     if what.fades and photos_known(state):
-        changed, fade = widgets.checkbox("Fade what no photo looked at", written.fades(state))
+        changed, fade = widgets.checkbox("Fade what no photo saw", written.fades(state))
         if changed:
             form = replace(form, fade=fade)
     return _narrowed(state, form, look)
@@ -135,7 +135,7 @@ def _order(state: State, look: Look) -> list[do.Command]:
     if isinstance(order, str):
         widgets.muted(order)
         return []
-    widgets.muted("The same on the command line:")
+    widgets.muted("As a command:")
     _command_line(order.line, look)
     issued = _copy(order.line)
     for remark in written.remarks(state):
@@ -157,7 +157,7 @@ def _buttons(state: State, look: Look, confirmed: bool) -> list[do.Command]:
         issued.append(do.ShowDialog(None))
     if busy:
         imgui.same_line()
-        imgui.text_colored(theme.MUTED, "one is under way")
+        imgui.text_colored(theme.MUTED, "an export is running")
     return issued
 
 
@@ -165,7 +165,7 @@ def draw_replacing(state: State, look: Look) -> list[do.Command]:
     """The question before files are written over."""
     there = state.exporting.there
     alone = len(there) == 1
-    imgui.text_wrapped("This file is there already:" if alone else "These files are there already:")
+    imgui.text_wrapped("This file already exists:" if alone else "These files already exist:")
     for file in there[:_NAMED]:
         widgets.muted(str(file))
     if len(there) > _NAMED:

@@ -106,7 +106,7 @@ class LoadScene(Job):
         from langflash_core.export import read as read_scene
 
         if self.edits is not None and not (self.edits.is_file() and self.path.is_file()):
-            raise SceneFileError("what was kept is not there any more; another window goes on with it")
+            raise SceneFileError("the saved progress is gone; another window is using it")
         scene = read_scene(self.path)
         if self.edits is not None:
             return SceneArrived(_restored(describe_scene(scene, serial, ""), self.edits), self.alone)
@@ -155,7 +155,7 @@ def describe_scene(scene: "Scene", serial: int, name: str, path: Path | None = N
     from langflash_core.types import NO_LANGUAGE
 
     mute = scene.semantics.space == NO_LANGUAGE
-    said = ("This splat file holds no language: phrases find nothing in it.",) if mute else ()
+    said = ("This file cannot answer phrases yet; langflash lift teaches it.",) if mute else ()
     means = scene.gaussians.means.double().numpy()
     views = []
     for viewmat, K in zip(scene.viewmats.double().numpy(), scene.Ks.double().numpy(), strict=True):

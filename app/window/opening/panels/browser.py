@@ -20,9 +20,9 @@ from ..state import Folder, small
 WIDTH = 760.0  # design pixels
 _HEIGHT, _CELL = 330.0, 132.0
 _HINTS = {
-    Dialog.OPEN: "a scene, a photo, a film or a folder; or choose below",
-    Dialog.MERGE: "a scene or a folder; or choose below",
-    Dialog.PLACE: "a folder; or walk to it below",
+    Dialog.OPEN: "type a scene, photo, film or folder, or choose below",
+    Dialog.MERGE: "type a scene or a folder, or choose below",
+    Dialog.PLACE: "type a folder, or choose one below",
 }
 
 
@@ -61,7 +61,7 @@ def _way(folder: Folder, look: Look) -> list[do.Command]:
     issued: list[do.Command] = []
     if imgui.button(f"{fa.ICON_FA_ARROW_UP}##up"):
         issued.append(opening.LookInto(folder.path.parent))
-    widgets.tooltip("The folder around this one")
+    widgets.tooltip("Parent folder")
     imgui.same_line(0, look.px(4))
     if imgui.button(f"{fa.ICON_FA_HOUSE}##home"):
         issued.append(opening.LookInto(Path.home()))
@@ -94,13 +94,11 @@ def _inside(state: State, folder: Folder, look: Look) -> list[do.Command]:
             imgui.same_line(0, gap)
         issued += _photo(state, path, ImVec2(room / columns - gap, look.px(_CELL)), look)
     if folder.left_out:
-        widgets.muted(f"and {folder.left_out} more; type the path of one of those")
+        widgets.muted(f"and {folder.left_out} more; type a path to open one of them")
     if folder.unsaid:
-        widgets.muted(f"and {folder.unsaid} whose names are not UTF-8; rename those")
+        widgets.muted(f"and {folder.unsaid} with names that are not UTF-8; rename them")
     if not (folder.folders or photos or films or scenes or folder.problem):
-        widgets.muted(
-            "No folder lies here." if state.dialog is Dialog.PLACE else "Nothing to open lies here."
-        )
+        widgets.muted("No folders here." if state.dialog is Dialog.PLACE else "Nothing to open here.")
     return issued
 
 
@@ -166,7 +164,7 @@ def _buttons(state: State, confirmed: bool, look: Look) -> list[do.Command]:
     imgui.same_line()
     if imgui.button("Cancel", look.vec(110, 0)):
         issued.append(do.ShowDialog(None))
-    told = "Enter merges it" if merging else "The space bar takes several, Enter opens"
+    told = "Enter merges" if merging else "Space selects several, Enter opens"
     widgets.beside(imgui.calc_text_size(told).x, look.px(14))
     imgui.align_text_to_frame_padding()
     imgui.text_colored(theme.MUTED, told)

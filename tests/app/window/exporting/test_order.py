@@ -127,7 +127,7 @@ def test_what_is_missing_is_said() -> None:
     assert "is the scene itself" in wrong(form(scene(), what=outputs.SCENE, path="/rooms/my room"))
     silent = after(scene(), ask.EditPrompt(0, ""))
     assert "needs a phrase" in wrong(form(silent, what=outputs.MASK, path="/x"))
-    assert "no phrase to keep" in wrong(form(silent, what=outputs.PLY, only_found=True, path="/x"))
+    assert "no phrase to export" in wrong(form(silent, what=outputs.PLY, only_found=True, path="/x"))
     assert "save it first" in wrong(form(scene(None), path="/x"))
 
 
