@@ -140,7 +140,7 @@ def found_world(
     return replace(world, guess=guessed(evidence(scene, world, surface)))
 
 
-NOT_SURE = "its photos do not tell for sure which way is up; langflash level, or the window, guesses it"
+NOT_SURE = "the photos do not clearly show which way is up; langflash level, or the window, guesses it"
 
 
 def levelled(scene: Scene) -> Scene:
@@ -170,7 +170,7 @@ def upright(scene: Scene) -> Scene:
     """
     world = scene.record.world
     if world is None:
-        raise InputError("nobody has looked how this scene stands; run langflash level first")
+        raise InputError("this scene is not level yet; run langflash level first")
     metres = scene.record.metric_scale or 1.0
     unit = None if scene.record.network_unit is None else scene.record.network_unit / metres
     guess = world.guess
@@ -452,7 +452,7 @@ def measured_by(scene: Scene, name: str, metres: float) -> Scene:
     """
     world = scene.record.world
     if world is None:
-        raise InputError("nobody has looked how this scene stands; run langflash level first")
+        raise InputError("this scene is not level yet; run langflash level first")
     usual = {"ceiling": CEILING, "door": DOOR}[name][0]
     found = [each for each in evidence(scene, world, surface_of(scene)) if each.name == name]
     if not found:

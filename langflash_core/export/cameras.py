@@ -365,7 +365,7 @@ def _photo_folder(folder: Path, paths: list[Path]) -> Path:
 
 
 def _frame_file(folder: Path, name: str) -> Path:
-    """The file of a frame; synthetic data sets leave the suffix away."""
+    """The file of a frame; synthetic data sets leave the suffix out."""
     file = folder / name
     return file if file.suffix else file.with_suffix(".png")
 

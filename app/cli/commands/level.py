@@ -55,9 +55,9 @@ def run(args: Namespace, out: TextIO) -> None:
     known = scene.record.metric_scale
     print(f"{document['scene']}: {world_line(world, known)}", file=out)
     if known:
-        print(f"a unit is {known:.4g} m, as you told it", file=out)
+        print(f"1 unit = {known:.4g} m, as you said", file=out)
     elif world.guess is not None:
-        print("tell a length, --ceiling or --door, and the scene is in metres", file=out)
+        print("give --length, --ceiling or --door to set the scale", file=out)
 
 
 def _write(scene: "Scene", output: Path) -> None:

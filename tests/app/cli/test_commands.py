@@ -333,7 +333,7 @@ def test_what_no_photo_looked_at_from_there_fades(run, of_photos, tmp_path, back
 
 def test_only_views_of_known_photos_fade(run, scene_file, of_photos, tmp_path):
     outcome = run("export", of_photos, "-o", tmp_path / "a.ply", "--fade")
-    assert outcome.code == 2 and "leave --fade away" in outcome.err
+    assert outcome.code == 2 and "leave --fade out" in outcome.err
     assert run("export", of_photos, "-o", tmp_path / "a.png", "--fade", *TORCH).code == 0
     outcome = run("export", scene_file, "-o", tmp_path / "b.png", "--fade", *TORCH)
     assert outcome.code == 2 and "leave --fade out" in outcome.err and not (tmp_path / "b.png").exists()

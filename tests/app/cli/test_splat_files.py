@@ -115,7 +115,7 @@ def test_a_page_holds_the_whole_scene_and_the_phrases(run, refused, scene_file, 
     outcome = run("export", ply_file, "-o", tmp_path / "new" / "plain.html")
     assert outcome.code == 0 and "answers" not in outcome.out
     page = tmp_path / "b.html"
-    assert "leave --view away" in refused("export", scene_file, "-o", page, "--view", "1")
+    assert "leave --view out" in refused("export", scene_file, "-o", page, "--view", "1")
     assert "is for videos" in refused("export", scene_file, "-o", page, "--seconds", "3")
     assert "is for web pages" in refused("export", scene_file, "-o", tmp_path / "b.ply", "--with-text")
     assert "'minilm' only" in refused("export", ply_file, "-o", page, "--with-text")
@@ -281,16 +281,16 @@ def test_video_without_its_package(refused, scene_file, tmp_path, monkeypatch):
         ("a.json", [], "--prompt"),
         ("a.png", ["--what", "labels"], "--prompt"),
         ("a.ply", ["--what", "labels", "--prompt", "armchair"], "takes a .png"),
-        ("a.ply", ["--view", "1"], "leave --view away"),
-        ("a.splat", ["--size", "9x9"], "leave --size away"),
-        ("a.mp4", ["--view", "1"], "leave --view away"),
+        ("a.ply", ["--view", "1"], "leave --view out"),
+        ("a.splat", ["--size", "9x9"], "leave --size out"),
+        ("a.mp4", ["--view", "1"], "leave --view out"),
         ("a.png", ["--seconds", "3"], "--seconds"),
         ("a.png", ["--path", "orbit"], "--path is for videos"),
         ("a.webp", ["--what", "heat"], "--prompt"),
         ("a.mp4", ["--what", "labels", "--prompt", "armchair"], "takes a .png"),
         ("a.png", ["--what", "surface", "--prompt", "armchair"], "takes a .glb"),
         ("a.glb", ["--what", "surface"], "--prompt"),
-        ("a.glb", ["--what", "surface", "--prompt", "armchair", "--view", "1"], "leave --view away"),
+        ("a.glb", ["--what", "surface", "--prompt", "armchair", "--view", "1"], "leave --view out"),
         ("a.png", ["--what", "instances"], "--prompt"),
         ("a.png", ["--what", "soft"], "--prompt"),
         ("a.png", ["--what", "depth", "--prompt", "armchair"], "takes no --prompt"),
@@ -298,7 +298,7 @@ def test_video_without_its_package(refused, scene_file, tmp_path, monkeypatch):
         ("a.ply", ["--what", "depth"], "takes a .png or .exr"),
         ("a", ["--segmented"], "--segmented needs phrases"),
         ("a", ["--segmented", "--prompt", "armchair", "--what", "mask"], "no --what"),
-        ("a", ["--segmented", "--prompt", "armchair", "--all-views"], "leave --all-views away"),
+        ("a", ["--segmented", "--prompt", "armchair", "--all-views"], "leave --all-views out"),
         ("a", ["--segmented", "--prompt", "armchair", "--seconds", "2"], "--seconds is for videos"),
         ("a", ["--segmented", "--prompt", "submarine", *TORCH], "lower --threshold"),
         ("a.mp4", ["--seconds", "0"], "--seconds"),
