@@ -209,4 +209,4 @@ def test_what_the_rest_means_is_said() -> None:
             frames(lambda at: cleaning.draw(edited(floaters=preview), at, *BIG), look(), 2)
     finally:
         widgets.tooltip = real
-    assert any("outside a box all goes" in text for text in seen)
+    assert any("all outside a box still goes" in text for text in seen)
