@@ -152,7 +152,7 @@ def _files() -> Iterable[Entry]:
     yield Entry("Back to the previous room", group, _room_before)
     yield Entry("Pause the reconstruction", group, _pause)
     yield Entry("Cancel the reconstruction", group, lambda s: show.CancelJob() if s.scene.job else None)
-    yield Entry("Keep the two photos that make the best scene together", group, _pair)
+    yield Entry("Keep only the two best photos", group, _pair)
     yield Entry("Put back the photos that were removed", group, _photos_back)
     yield Entry(
         "Clear the tray", group, lambda s: show.ClearPhotos() if s.scene.photos and not s.scene.job else None

@@ -83,13 +83,23 @@ def clipped(row: Row) -> bool:
 
 
 def collisions(rows: list[Row]) -> list[tuple[Row, Row]]:
-    """Pairs of one window that lie on each other; a line that can be chosen has its words on it."""
-    plain = [row for row in rows if row.kind != "selectable" and row.words]
+    """Pairs of one window that lie on each other; of a line that can be chosen its words count alone."""
+    worded = [row for row in rows if row.words]
     return [
         (one, other)
-        for one, other in combinations(plain, 2)
-        if one.window == other.window and overlap(_smaller(one.box), _smaller(other.box))
+        for one, other in combinations(worded, 2)
+        if one.window == other.window and overlap(_smaller(_taken(one)), _smaller(_taken(other)))
     ]
+
+
+def _taken(row: Row) -> Box:
+    left, top, right, bottom = row.box
+    return (
+        left,
+        top,
+        left + imgui.calc_text_size(row.words).x if row.kind == "selectable" else right,
+        bottom,
+    )
 
 
 def _smaller(box: Box) -> Box:

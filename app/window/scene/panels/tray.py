@@ -76,8 +76,11 @@ def sentences(said: Iterable[str], how: str = HOW_TO_TELL) -> list[str]:
 
 
 def said_here(text: str, how: str = HOW_TO_TELL) -> str:
-    """A warning as a sentence; what the core says of its command line in the window's words."""
-    return widgets.sentence(text.replace("set it with --fov", how))
+    """A warning as a sentence; what the core says of its command line in the window's words, also as files
+    of before have it."""
+    for told in ("set it with --fov", "on the command line, --fov tells it"):
+        text = text.replace(told, how)
+    return widgets.sentence(text)
 
 
 def _hint(look: Look) -> None:
