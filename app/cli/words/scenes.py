@@ -58,10 +58,7 @@ def add_reconstruct(commands) -> None:
     )
     add_output(command, "SCENE", "the scene to write")
     command.add_argument(
-        "--frames",
-        type=frame_count,
-        metavar="N",
-        help="use at most N frames of a film (default: 32)",
+        "--frames", type=frame_count, metavar="N", help="use at most N frames of a film (default: 32)"
     )
     add_film_part(command)
     add_network(command)
@@ -140,9 +137,7 @@ def add_frames(commands) -> None:
         metavar="S",
         help="the sharpest frame every S seconds, however far the camera moves",
     )
-    command.add_argument(
-        "--sheet", type=Path, metavar="IMG", help="also write a .png or .jpg with all of them"
-    )
+    command.add_argument("--sheet", type=Path, metavar="IMG", help="also write them as one .png or .jpg")
     add_json(command)
 
 
@@ -297,11 +292,9 @@ def add_export(commands) -> None:
     )
     add_colours(command)
     command.add_argument(
-        "--all-views", action="store_true", help="write one file for every photo: FILE_1, FILE_2 and so on"
+        "--all-views", action="store_true", help="one file per photo: FILE_1, FILE_2 and so on"
     )
-    command.add_argument(
-        "--with-text", action="store_true", help="let an .html answer any phrase; adds 28 MB"
-    )
+    command.add_argument("--with-text", action="store_true", help="an .html answers any phrase; adds 28 MB")
     command.add_argument(
         "--beside",
         nargs="+",
@@ -402,10 +395,7 @@ def add_hide(commands) -> None:
         help="hide this much around it too, as a share of a photo's longer side (default: 0.02)",
     )
     command.add_argument(
-        "--threshold",
-        type=kept_fraction,
-        metavar="T",
-        help="hide what scores at least T, between 0 and 1",
+        "--threshold", type=kept_fraction, metavar="T", help="hide what scores at least T, between 0 and 1"
     )
     command.add_argument(
         "--open",
@@ -419,7 +409,7 @@ def add_hide(commands) -> None:
         help="photos in the file: painted over where they show it, or left out (default: painted)",
     )
     command.add_argument(
-        "--preview", type=Path, metavar="IMG", help="write a .png: what is hidden in red, and the result"
+        "--preview", type=Path, metavar="IMG", help="a .png: what is hidden, in red, and after"
     )
     add_backend(command)
     add_json(command)
@@ -440,20 +430,13 @@ def add_clean(commands) -> None:
         "--strength",
         type=share,
         metavar="T",
-        help="how much to remove, 0 to 1 (default: 0.5 if nothing else is asked for)",
+        help="how much to remove, 0 to 1 (default: 0.5 without other rules)",
     )
     command.add_argument(
-        "--kinds",
-        nargs="+",
-        choices=KINDS,
-        metavar="KIND",
-        help=f"what to remove: {', '.join(KINDS)} (default: all)",
+        "--kinds", nargs="+", choices=KINDS, metavar="KIND", help=f"remove {', '.join(KINDS)} (default: all)"
     )
     command.add_argument(
-        "--where",
-        nargs="+",
-        metavar="RULE",
-        help="also remove what meets all conditions of one of these rules",
+        "--where", nargs="+", metavar="RULE", help="also remove what meets all of one of these rules"
     )
     command.add_argument("--within", nargs="+", metavar="PHRASE", help="only within what these find")
     command.add_argument("--invert", action="store_true", help="remove the rest instead")
@@ -468,7 +451,7 @@ def add_clean(commands) -> None:
     )
     command.add_argument("--fill", action="store_true", help="fill what was removed from what is around it")
     command.add_argument(
-        "--preview", type=Path, metavar="IMG", help="write a .png: what goes in red, and the result"
+        "--preview", type=Path, metavar="IMG", help="write a .png: what goes, in red, and after"
     )
     add_axes(command)
     add_backend(command)
