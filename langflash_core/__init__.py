@@ -28,8 +28,9 @@ Files
     write         all that `langflash export` writes, by an ExportRequest:
                   lf.write(scene, lf.ExportRequest(Path("plant.png"), what="mask", prompts=("plant",)))
 
-A scene may be given as the path of its file. Views are counted from 0 here. Whatever cannot be done raises a
-LangFlashError of one sentence, with what helps behind its semicolon.
+A scene may be given as the path of its file. Views are counted from 0 here; the command line, the window
+and all files count photos from 1. Whatever cannot be done raises a LangFlashError of one sentence, with what
+helps behind its semicolon.
 """
 
 # All is read in at first use: importing the package alone costs no torch. It settles how torch's threads

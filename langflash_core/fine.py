@@ -31,8 +31,8 @@ from langflash_core.splat.compose import Nearness
 from langflash_core.types import Cost, Prediction, Scene, Views
 
 _HELD = 8  # photos that stay decoded
-_LEFT_OUT = "1 photo shows something that the others do not ({}); it is left out"
-_LEFT_OUT_OF_SOME = "{} photos show things that the others do not ({}); those things are left out"
+_LEFT_OUT = "{} disagrees with the other photos and was left out"
+_LEFT_OUT_OF_SOME = "{} disagree with the other photos and were left out"
 
 
 MOST_LAYERS = 62
@@ -187,7 +187,7 @@ def _told(left_out: dict[str, list[float]], names: tuple[str, ...]) -> list[str]
     count, line = sum(share > 0 for share in left_out.get("shares", ())), left_out_line(left_out, names)
     if count < 2:
         return [_LEFT_OUT.format(line)] if count else []
-    return [_LEFT_OUT_OF_SOME.format(count, line)]
+    return [_LEFT_OUT_OF_SOME.format(line)]
 
 
 def _with_layers(prediction: Prediction) -> Bool[Tensor, " V"]:

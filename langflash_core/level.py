@@ -140,7 +140,7 @@ def found_world(
     return replace(world, guess=guessed(evidence(scene, world, surface)))
 
 
-NOT_SURE = "its photos do not tell for sure which way is up; langflash level, or the window, guesses it"
+NOT_SURE = "the photos do not clearly show which way is up; langflash level, or the window, guesses it"
 
 
 def levelled(scene: Scene) -> Scene:
@@ -170,7 +170,7 @@ def upright(scene: Scene) -> Scene:
     """
     world = scene.record.world
     if world is None:
-        raise InputError("nobody has looked how this scene stands; run langflash level first")
+        raise InputError("this scene is not level yet; run langflash level first")
     metres = scene.record.metric_scale or 1.0
     unit = None if scene.record.network_unit is None else scene.record.network_unit / metres
     guess = world.guess
@@ -452,7 +452,7 @@ def measured_by(scene: Scene, name: str, metres: float) -> Scene:
     """
     world = scene.record.world
     if world is None:
-        raise InputError("nobody has looked how this scene stands; run langflash level first")
+        raise InputError("this scene is not level yet; run langflash level first")
     usual = {"ceiling": CEILING, "door": DOOR}[name][0]
     found = [each for each in evidence(scene, world, surface_of(scene)) if each.name == name]
     if not found:
@@ -471,7 +471,7 @@ def seen_at(scene: Scene, view: int, u: float, v: float) -> tuple[float, float, 
     width, height = scene.view_size
     if not 0 <= view < scene.num_views or not (0 <= u <= width and 0 <= v <= height):
         raise InputError(
-            f"{view}:{u:g},{v:g} is no pixel of a photo; this scene has photos 0 to {scene.num_views - 1} of "
+            f"{view + 1}:{u:g},{v:g} is no pixel of a photo; this scene has photos 1 to {scene.num_views} of "
             f"{width} x {height} pixels"
         )
     whole = scene.camera(view)
@@ -479,6 +479,6 @@ def seen_at(scene: Scene, view: int, u: float, v: float) -> tuple[float, float, 
     K[0, 2], K[1, 2] = K[0, 2] - u + 0.5, K[1, 2] - v + 0.5  # its middle is the pixel of a picture of one
     frame = render(scene, Camera(whole.viewmat, K, 1, 1), weight_maps=False)
     if float(frame.alphas[0, 0]) < 0.5:
-        raise InputError(f"nothing is seen at pixel {u:g},{v:g} of photo {view}; name another")
+        raise InputError(f"nothing is seen at pixel {u:g},{v:g} of photo {view + 1}; name another")
     x, y, z = world_points(frame.depths, Camera(whole.viewmat, K, 1, 1))[0, 0].tolist()
     return x, y, z

@@ -210,7 +210,7 @@ def own_views(frames: Sequence[Frame], cameras: Sequence[Camera]) -> Views:
     for frame in frames:
         grey = frame.rgb + (1 - frame.alphas[..., None]) * _GREY
         images.append(grey.clamp(0, 1).permute(2, 0, 1).float())
-    names = tuple(f"view {index}" for index in range(len(frames)))
+    names = tuple(f"view {number}" for number in range(1, len(frames) + 1))
     Ks = torch.stack([camera.K.float() for camera in cameras])
     return Views(torch.stack(images), Ks, names, tuple(_jpeg(image) for image in images))
 

@@ -44,7 +44,7 @@ class Output:
     gaps in them may be filled. colours: by a colour map. every: it is of all photos' views, unless one is
     named.
 
-    beside: name of what is written beside each file, with its `{stem}`; with `{view}`, a file a view. keys:
+    beside: name of what is written beside each file, with its `{stem}`; with `{photo}`, a file a view. keys:
     of a .json of this kind, in its object or in every entry of its list.
     """
 
@@ -116,12 +116,15 @@ class Output:
         """`target`, or its file of each photo; `photos` as `files`."""
         if photos is None or not self.each:
             return (target,)
-        return tuple(target.with_name(f"{target.stem}_{view}{target.suffix}") for view in range(photos))
+        return tuple(
+            target.with_name(f"{target.stem}_{number}{target.suffix}") for number in range(1, photos + 1)
+        )
 
     def files_beside(self, file: Path, photos: int | None) -> tuple[Path, ...]:
         """What lies beside one of its own files; `photos` as `files`."""
-        count = (photos or 1) if "{view}" in self.beside else int(bool(self.beside))
-        return tuple(file.with_name(self.beside.format(stem=file.stem, view=view)) for view in range(count))
+        count = (photos or 1) if "{photo}" in self.beside else int(bool(self.beside))
+        numbers = range(1, count + 1)  # as people count photos
+        return tuple(file.with_name(self.beside.format(stem=file.stem, photo=number)) for number in numbers)
 
 
 def _splats(name: str, endings: tuple[str, ...], writer: str, reader: str, **more: Any) -> Output:
@@ -144,11 +147,11 @@ MASK = Output(
     word="mask", phrases="some", looks=True, each=True, writer="writing.views:write_pictures",
 )  # fmt: skip
 SOFT = Output(
-    "soft", (".png",), "Soft mask", "How much of each pixel any phrase is, grey of 16 bits",
+    "soft", (".png",), "Soft mask", "How much of each pixel belongs to any phrase, 16-bit grey",
     word="soft", phrases="some", looks=True, each=True, writer="writing.parts:write_parts",
 )  # fmt: skip
 CUTOUT = Output(
-    "cutout", (".png",), "Cut-out", "What the phrases find, on transparency (RGBA)",
+    "cutout", (".png",), "Cut-out", "What the phrases find, on a transparent background (RGBA)",
     word="cutout", unsaid=True, phrases="some", looks=True, each=True, writer="writing.parts:write_parts",
 )  # fmt: skip
 LABELS = Output(
@@ -158,7 +161,7 @@ LABELS = Output(
 )  # fmt: skip
 INSTANCES = Output(
     "instances", (".png",), "Instances",
-    "A number for each connected thing: three chairs are three; and a legend",
+    "One number per connected thing (three chairs are three), and a legend",
     word="instances", phrases="some", looks=True, each=True, beside="{stem}.json",
     writer="writing.parts:write_parts",
 )  # fmt: skip
@@ -178,7 +181,7 @@ SEGMENTED = Output(
 COCO = Output(
     "coco", (".json",), "COCO masks", "Instance masks as COCO JSON, and the pictures they belong to",
     subject="answers", noun="a .json of masks", phrases="some", looks=True, every=True,
-    beside="{stem}_{view}.png", keys=("images", "annotations"),
+    beside="{stem}_{photo}.png", keys=("images", "annotations"),
     writer="writing.views:write_coco_masks", of_answer="export.coco:write_answer",
 )  # fmt: skip
 BOXES_JSON = Output(
@@ -192,7 +195,7 @@ BOXES_CSV = Output(
     writer="writing.boxes:write_boxes",
 )  # fmt: skip
 BOXES_GLB = Output(
-    "boxes_bodies", (".glb",), "Boxes, .glb", "The same as bodies, for Blender and other 3D programs",
+    "boxes_bodies", (".glb",), "Boxes, .glb", "The same as boxes, for Blender and other 3D programs",
     subject="answers", word="boxes", phrases="some", looks=True,
     writer="writing.boxes:write_boxes", of_answer="export.glb:write_answer",
 )  # fmt: skip
@@ -201,7 +204,7 @@ SURFACE = Output(
     subject="answers", word="surface", phrases="some", writer="writing.parts:write_surface",
 )  # fmt: skip
 NUMBERS = Output(
-    "numbers", (".npz",), tip="The view as numbers: colour, depth, weight maps; or relevance and masks",
+    "numbers", (".npz",), tip="The view as arrays: colour, depth, weight maps; or relevance and masks",
     phrases="narrow", looks=True, writer="writing.views:write_numbers", of_answer="export.npz:write_npz",
 )  # fmt: skip
 VIDEO = Output(
@@ -209,7 +212,7 @@ VIDEO = Output(
     subject="film", phrases="narrow", moves=True, fades=True, fills=True, writer="writing.films:write_film",
 )  # fmt: skip
 WEBP = Output(
-    "film_webp", (".webp",), "Film, .webp", "The same for pages and messages, without a player",
+    "film_webp", (".webp",), "Film, .webp", "The same as an animated picture, for pages and messages",
     subject="film", stem="film", phrases="narrow", moves=True, fades=True, fills=True,
     writer="writing.films:write_film",
 )  # fmt: skip
@@ -246,12 +249,12 @@ GLB = _splats(
 OPEN_USD = _splats("usd", USD, "export.usd:write_usd", "export.usd:read_usd")
 PAGE = Output(
     "page", (".html",), "Web page",
-    "One HTML file for any browser, to fly through and to ask, without a network",
+    "One HTML file to fly through and ask in any browser, even offline",
     subject="page", phrases="show", writer="writing.scenes:write_page", of_scene="export.html:write_html",
 )  # fmt: skip
 SCENE = _splats(
     "langflash", (".langflash",), "scene.file:save", "scene.file:load",
-    label="Scene", tip="With language and photos, for this program", stem="copy",
+    label="Scene", tip="All of it with language and photos, for this program", stem="copy",
 )  # fmt: skip
 COLMAP = Output(
     "colmap", ("cameras.txt",), tip="COLMAP's text model", subject="photos", phrases="narrow",

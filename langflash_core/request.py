@@ -90,7 +90,8 @@ class ExportRequest:
         words += ["--segmented"] if self.segmented else []
         for name in ("what", "threshold", "view", "camera", "size", "backend", "seconds", "path", "axes"):
             value = getattr(self, name)
-            words += [] if value is None else [f"--{name}", _said(value)]
+            said = value + 1 if name == "view" and value is not None else value  # people count from 1
+            words += [] if value is None else [f"--{name}", _said(said)]
         words += [] if self.colormap == COLOUR_MAPS[0] else ["--colormap", self.colormap]
         if self.span is not None:  # in one word where it begins like an option
             low_high = _said(self.span)
@@ -163,21 +164,21 @@ def _check_phrases(request: ExportRequest) -> None:
 def _check_options(request: ExportRequest, kind: Output) -> None:
     for name in ("seconds", "path"):
         if getattr(request, name) is not None and not kind.moves:
-            raise InputError(f"--{name} is for videos; name an .mp4 or .webp, or leave it away")
+            raise InputError(f"--{name} is for videos; name an .mp4 or .webp, or leave it out")
     if not kind.colours and (request.span is not None or request.colormap != COLOUR_MAPS[0]):
-        raise InputError("--colormap and --span colour heat-maps; add --what heat, or leave them away")
+        raise InputError("--colormap and --span colour heat-maps; add --what heat, or leave them out")
     if request.with_text and kind.subject != "page":
-        raise InputError("--with-text is for web pages; name an .html, or leave it away")
+        raise InputError("--with-text is for web pages; name an .html, or leave it out")
     if request.beside and kind.subject != "page":
-        raise InputError("--beside is for web pages; name an .html, or leave it away")
+        raise InputError("--beside is for web pages; name an .html, or leave it out")
     if request.detail == "low" and not kind.splats:
-        raise InputError("--detail low is for splats, scenes and web pages; name one, or leave it away")
+        raise InputError("--detail low is for splats, scenes and web pages; name one, or leave it out")
     if request.upright and kind.subject not in ("scene", "photos"):
-        raise InputError("--upright is for splats, scenes and poses of photos; name one, or leave it away")
+        raise InputError("--upright is for splats, scenes and poses of photos; name one, or leave it out")
     if request.axes and not any(map(request.axes_of, (request.output, *_read_by(request)))):
-        raise InputError("--axes is for .spz files, read or written; name one, or leave it away")
+        raise InputError("--axes is for .spz files, read or written; name one, or leave it out")
     if request.fill and not (kind.fills and (kind.phrases == "one" or not request.prompts)):
-        raise InputError("--fill is for pictures and films of the whole scene and heat-maps; leave it away")
+        raise InputError("--fill is for pictures and films of the whole scene and heat-maps; leave it out")
 
 
 def _read_by(request: ExportRequest) -> tuple[Path, ...]:
@@ -188,15 +189,15 @@ def _check_camera(request: ExportRequest, kind: Output) -> None:
     looked_from = request.looked_from
     if request.all_views:
         if request.segmented:
-            raise InputError("--segmented looks from every photo by itself; leave --all-views away")
+            raise InputError("--segmented looks from every photo by itself; leave --all-views out")
         if set(looked_from) - {"size", "ortho"}:
-            raise InputError(f"--all-views looks from every photo; leave --{looked_from[0]} away")
+            raise InputError(f"--all-views looks from every photo; leave --{looked_from[0]} out")
         looked_from.append("all-views")
     ending = kind_of(request.output)
     if not kind.sized and looked_from:
-        raise InputError(f"a {ending} holds what all views show, not one; leave --{looked_from[0]} away")
+        raise InputError(f"a {ending} holds what all views show, not one; leave --{looked_from[0]} out")
     if not kind.sized and request.fade:
-        raise InputError(f"a {ending} holds the whole scene, and only views fade; leave --fade away")
+        raise InputError(f"a {ending} holds the whole scene, and only views fade; leave --fade out")
     extra = [name for name in looked_from if name != "size"]
     if kind.moves and extra:
-        raise InputError(f"a video moves by itself; leave --{extra[0]} away, or say --path")
+        raise InputError(f"a video moves by itself; leave --{extra[0]} out, or say --path")

@@ -203,7 +203,7 @@ def test_somebody_before_one_photo_leaves_no_trace_in_the_scene():
     assert [share > 0 for share in shares] == [False, False, True, False]
     said = [warning for warning in scene.record.warnings if "left out" in warning]
     here = f"{round(100 * shares[2])} % of {given.views.names[2]}"
-    assert said == [f"1 photo shows something that the others do not ({here}); it is left out"]
+    assert said == [f"{here} disagrees with the other photos and was left out"]
     drawn = render(scene, scene.camera(2, 120, 90), weight_maps=False).rgb.movedim(-1, 0)
     behind = light.corrected(given.photos[2], view=2)[:, 15:81, 6:36]
     # .4 with somebody there; the borders of the hole are soft, and the others' layers fill the rest.
@@ -212,8 +212,8 @@ def test_somebody_before_one_photo_leaves_no_trace_in_the_scene():
 
 def test_what_several_photos_show_alone_is_said_in_number_and_by_name():
     said = _told({"shares": [0.42, 0.0, 0.16]}, ("a.jpg", "b.jpg", "c.jpg"))
-    shown = "2 photos show things that the others do not (42 % of a.jpg, 16 % of c.jpg)"
-    assert said == [f"{shown}; those things are left out"] and _told({}, ("a.jpg",)) == []
+    shown = "42 % of a.jpg, 16 % of c.jpg disagree with the other photos and were left out"
+    assert said == [shown] and _told({}, ("a.jpg",)) == []
 
 
 def test_of_two_photos_nothing_is_left_out():

@@ -114,7 +114,7 @@ def test_every_field_of_a_request_is_an_option() -> None:
         ({"detail": "low"}, "for splats"),
         ({"output": Path("a.ply"), "axes": "rdf"}, "--axes is for .spz files"),
         ({"fill": True, "prompts": ("plant",)}, "--fill is for"),
-        ({"all_views": True, "view": 0}, "leave --view away"),
+        ({"all_views": True, "view": 0}, "leave --view out"),
         ({"output": Path("a.ply"), "size": (2, 2)}, "holds what all views show"),
         ({"output": Path("a.ply"), "fade": True}, "only views fade"),
         ({"output": Path("a.mp4"), "view": 1}, "moves by itself"),

@@ -59,7 +59,7 @@ def with_frames(
     films = [path for path in photos if is_film(path)]
     if not films:
         if most is not None or start or end is not None:
-            raise InputError("--frames, --from and --to are for films; leave them away")
+            raise InputError("--frames, --from and --to are for films; leave them out")
         return list(photos), [], []
     room = (MAX_PHOTOS - len(photos) + len(films)) // len(films)
     if room < 2:

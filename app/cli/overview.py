@@ -20,11 +20,11 @@ GROUPS = {
 """Every command, under the heading that `--help` gives it."""
 
 FIRST_DAY = {
-    "reconstruct photos/ -o room.langflash": "makes a scene of photos",
-    "view room.langflash": "shows it in the window",
-    'query room.langflash "armchair"': "tells where a thing is in it",
-    "render room.langflash -o room.png": "draws a picture of it",
-    "export room.langflash -o room.html": "writes it as a web page",
+    "reconstruct photos/ -o room.langflash": "make a scene from photos",
+    "view room.langflash": "open it in the window",
+    'query room.langflash "armchair"': "find a thing in it",
+    "render room.langflash -o room.png": "draw a picture of it",
+    "export room.langflash -o room.html": "write it as a web page",
 }
 """The words after `langflash` of an example each, and what it does."""
 
@@ -37,7 +37,7 @@ def first_day() -> str:
     examples = (f"  langflash {words:<{wide}}  {purpose}" for words, purpose in FIRST_DAY.items())
     return "\n".join(
         (
-            "LangFlash makes 3D scenes of photos and finds things in them. To begin with:",
+            "LangFlash makes 3D scenes from photos and finds things in them. To start:",
             "",
             *examples,
             "",

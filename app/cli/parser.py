@@ -85,7 +85,7 @@ def build_parser(command: str | None = None) -> Parser:
         words = import_module(f".words.{COMMANDS[name]}", __package__)
         getattr(words, f"add_{name.replace('-', '_')}")(commands)
     purposes = {name: below.description or "" for name, below in commands.choices.items()}
-    about = "Makes 3D scenes of photos without poses, and finds things in them by words."
+    about = "Makes 3D scenes from photos without poses, and finds things in them by words."
     parser.description = f"{about}\n\n{in_groups(purposes)}"
     return parser
 

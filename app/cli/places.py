@@ -110,7 +110,7 @@ class _Maker:
         files = [
             {kind: Path(path).name for kind, path in entry.items()} for entry in write_answers(result, folder)
         ]
-        document = {"scene": f"../{SCENE}", "view": 0, "backend": renderer.backend}
+        document = {"scene": f"../{SCENE}", "view": 1, "backend": renderer.backend}
         stream = io.StringIO()
         write_json({**document, **answers_document(scene, result, files)}, stream)
         write_atomically(folder / "answers.json", stream.getvalue().encode())

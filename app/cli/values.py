@@ -34,9 +34,11 @@ def point(text: str) -> tuple[float, float, float]:
     return x, y, z
 
 
-def view_index(text: str) -> int:
-    """Index of a photo, from 0."""
-    return _whole(text, 0, 10**6)
+def photo_index(text: str) -> int:
+    """Index of a photo, from 0; people count from 1."""
+    if text.strip() == "0":
+        raise ArgumentTypeError("photos count from 1; 1 is the first photo")
+    return _whole(text, 1, 10**6) - 1
 
 
 def seed(text: str) -> int:

@@ -342,7 +342,7 @@ class Session:
     def _living(self) -> Iterator[None]:
         """What goes wrong inside is said, also what the graphics driver refuses: edits hang on none of it."""
         try:
-            with refusals_said(None, "edits stay; close other programs, or make this window smaller"):
+            with refusals_said(None, "edits are safe; close other programs, or make this window smaller"):
                 yield
         except LangFlashError as error:
             self._perform(Notify(str(error)))

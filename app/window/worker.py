@@ -235,6 +235,6 @@ def _import_ahead(name: str) -> None:
 
 def _unexpected(error: Exception) -> str:
     if out_of_memory(error):
-        return "There was not enough memory; close other programs, or take fewer or smaller photos."
+        return "There was not enough memory; close other programs, or use fewer or smaller photos."
     log.exception("the worker met an unexpected error")
     return f"Something unexpected went wrong ({type(error).__name__}: {error}); please report it."

@@ -114,7 +114,7 @@ def _told_axes(path: Path, axes: str | None, error: type[LangFlashError]) -> dic
     if axes is None:
         return {}
     if kind_of(path) != ".spz":
-        raise error(f"{path.name} has its format's axes, which are told of a .spz alone; leave axes away")
+        raise error(f"{path.name} has its format's axes, which are told of a .spz alone; leave axes out")
     if axes.lower() not in AXES:
         raise error(f"axes {axes} are unknown; use {', '.join(AXES)}")
     return {"axes": axes.lower()}

@@ -235,8 +235,8 @@ def _write_photos(scene: Scene, path: Path) -> tuple[list[str], list[tuple[int, 
         raise OutputError(f"cannot write {path.name}: the scene has no photos; reconstruct it from photos")
     make_folder(path.parent / _IMAGES)
     names, sizes = [], []
-    for view, photo in enumerate(scene.photos):
-        names.append(f"{view:03d}.jpg")
+    for number, photo in enumerate(scene.photos, start=1):
+        names.append(f"{number:03d}.jpg")
         sizes.append(_picture_size(photo, path))
         write_atomically(path.parent / _IMAGES / names[-1], photo)
     return names, sizes
@@ -365,7 +365,7 @@ def _photo_folder(folder: Path, paths: list[Path]) -> Path:
 
 
 def _frame_file(folder: Path, name: str) -> Path:
-    """The file of a frame; synthetic data sets leave the suffix away."""
+    """The file of a frame; synthetic data sets leave the suffix out."""
     file = folder / name
     return file if file.suffix else file.with_suffix(".png")
 

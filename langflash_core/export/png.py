@@ -13,11 +13,12 @@ from torch import Tensor
 from langflash_core.colormaps import HeatColours
 from langflash_core.export.colours import heat, label_colours
 from langflash_core.files import write_atomically
+from langflash_core.scene.gaps import filled
 from langflash_core.types import LUMA, Frame, QueryResult
 
 USUAL = HeatColours()
 RANGES = {"cosine": (-1.0, 1.0), "relevancy": (0.0, 1.0)}
-GLOW = 0.85  # share of the heat colour where relevance is highest
+GLOW = 0.7  # share of the heat colour where the photo is white, as in the window
 LABEL_OPACITY = 0.6  # of a phrase's colour over the view, as in the window
 DIM = 0.6  # brightness of the photo where nothing was found
 
@@ -99,8 +100,14 @@ def heat_over(
     first, last = colours.ends(threshold, high)
     shades = heat((strength - first) / max(last - first, 1e-6), colours.colormap)
     dimmed = DIM * (0.7 * grey + 0.3 * view)
-    lit = GLOW * shades * (0.35 + 0.65 * grey) + (1 - GLOW) * view
+    lit = torch.lerp(view, shades, glow_share(grey))
     return dimmed * (1 - glow) + lit * glow
+
+
+def glow_share(grey: Tensor) -> Tensor:
+    """How much of a heat colour covers a photo of this brightness: all where it is dark and has nothing to
+    show, or what is found in a dark room would hardly be seen."""
+    return GLOW + (1 - GLOW) * (1 - grey) ** 2
 
 
 def write_labels(path: Path, labels: Tensor, names: Sequence[str]) -> None:
@@ -155,10 +162,12 @@ def write_answer(result: QueryResult, path: Path) -> None:
 
 
 def label_picture(result: QueryResult) -> np.ndarray:
-    """(H, W, 3) uint8: each pixel in the colour of the phrase that fits best, dimmed where none does."""
+    """(H, W, 3) uint8: each pixel in the colour of the phrase that fits best, dimmed where none does; gaps
+    show what is around them, or labels would float on black."""
     labels = label_map(result).cpu()  # (H, W), 0 is none
     colours = np.concatenate((np.zeros((1, 3)), label_colours(len(result.answers)) / 255))
-    rgb = result.frame.rgb.detach().cpu().float().clamp(0, 1)
+    frame = result.frame
+    rgb = filled(frame.rgb.detach().cpu().float(), frame.alphas.detach().cpu().float()).clamp(0, 1)
     coloured = (1 - LABEL_OPACITY) * rgb + LABEL_OPACITY * torch.from_numpy(colours).float()[labels]
     return to_8bit(torch.where((labels > 0)[..., None], coloured, 0.4 * rgb))
 

@@ -156,7 +156,6 @@ def _decoded(source: bytes) -> Tensor:
 
 
 def _assumption(assumed: list[str], total: int) -> str:
-    whose = "the photos do" if len(assumed) == total > 1 else f"{' and '.join(assumed)} do"
-    whose = f"{assumed[0]} does" if len(assumed) == 1 else whose
-    assumption = f"assumed field of view {ASSUMED_FOV:g} degrees"
-    return f"{assumption}, {whose} not record the lens; on the command line, --fov tells it"
+    whose = "the photos do not record their lens" if len(assumed) == total > 1 else ""
+    whose = whose or f"{' and '.join(assumed)} {'does' if len(assumed) == 1 else 'do'} not record the lens"
+    return f"{whose}, a field of view of {ASSUMED_FOV:g}° is assumed; set it with --fov"

@@ -80,7 +80,10 @@ class Hidden:
 
     def document(self) -> dict[str, Any]:
         """Plain JSON values."""
-        return {**vars(self), "photos": {str(view): round(share, 4) for view, share in self.photos.items()}}
+        return {
+            **vars(self),
+            "photos": {str(view + 1): round(share, 4) for view, share in self.photos.items()},
+        }
 
 
 def hide(

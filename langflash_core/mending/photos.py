@@ -92,7 +92,7 @@ def _decoded(photo: bytes, view: int) -> UInt8[np.ndarray, "h w 3"]:
             return np.asarray(opened.convert("RGB"))
     except (OSError, SyntaxError, ValueError) as error:
         raise SceneFileError(
-            f"photo {view} inside the scene is damaged; leave all photos out with --photos none"
+            f"photo {view + 1} inside the scene is damaged; leave all photos out with --photos none"
         ) from error
 
 

@@ -161,7 +161,7 @@ def _shares_line(shares: tuple[float, ...], names: Sequence[str]) -> str:
     some = [(share, view) for view, share in enumerate(shares) if share > 0]
     most = sorted(sorted(some, reverse=True)[:_NAMED], key=lambda one: one[1])
     apart = len(names) == len(set(names)) == len(shares) and all(0 < len(name) <= _SHORT for name in names)
-    called = names if apart else [f"photo {view}" for view in range(len(shares))]
+    called = names if apart else [f"photo {number}" for number in range(1, len(shares) + 1)]
     parts = [f"{max(1, round(100 * share))} % of {called[view]}" for share, view in most]
     return ", ".join(parts) + (f" and some of {_others(len(some) - _NAMED)}" if len(some) > _NAMED else "")
 
@@ -178,11 +178,11 @@ def world_line(world: World | None, metric_scale: float | None = None) -> str:
     """
     if world is None:
         return ""
-    known = {"edges": "edges of the photos", "surfaces": "surfaces", "told": "you"}[world.up_by]
-    up = f"up as {known} tell it" + (f" (± {world.up_error:.1f} degrees)" if world.up_error else "")
-    floor = {"floor": "on its floor", "lowest": "on what is lowest, for no floor is seen"}
-    north = {"walls": "north along the wall that the first photo faces", "told": "north as you told it"}
-    parts = [up, floor.get(world.floor_by, "on the point that you told"), north[world.north_by]]
+    known = {"edges": "edges in the photos", "surfaces": "surfaces", "told": "you"}[world.up_by]
+    up = f"levelled by {known}" + (f" (± {world.up_error:.1f}°)" if world.up_error else "")
+    floor = {"floor": "floor found", "lowest": "no floor seen, so it stands on its lowest point"}
+    north = {"walls": "north is the wall in the first photo", "told": "north as you said"}
+    parts = [up, floor.get(world.floor_by, "standing on the point that you named"), north[world.north_by]]
     if world.guess is not None and metric_scale is None:
         parts.append(guess_line(world.guess))
     return "; ".join(parts)
@@ -193,7 +193,7 @@ def guess_line(guess: Guess) -> str:
     by = (
         ", ".join(guess.by[:-1]) + (" and " if guess.by[1:] else "") + guess.by[-1] if guess.by else "nothing"
     )
-    return f"a guess from {by}: a unit is {guess.metres:.2f} m (± {guess.spread:.0%})"
+    return f"scale guessed from {by}: 1 unit ≈ {guess.metres:.2f} m (± {100 * guess.spread:.0f} %)"
 
 
 def _count(value: object) -> str:

@@ -51,7 +51,9 @@ def pose_of_view(found: Container, view: int) -> Pose:
     """
     viewmats, Ks = found.arrays["viewmats"], found.arrays["Ks"]
     if not 0 <= view < len(viewmats):
-        raise ViewError(f"there is no view {view}: this scene has {len(viewmats)}, counted from 0")
+        raise ViewError(
+            f"there is no photo {view + 1}: this scene has {len(viewmats)}; use --view 1 to {len(viewmats)}"
+        )
     return _pose(found, viewmats[view].astype(float), Ks[view].astype(float), found.view_size, False)
 
 

@@ -39,10 +39,14 @@ def write_boxes(job: Job) -> str:
 def box_rows(
     results: Iterable[QueryResult], views: Iterable[int | None], scene: Scene
 ) -> list[dict[str, Any]]:
-    """A row per view and phrase; lengths in metres where the scene's scale is known."""
+    """A row per view, counted from 1, and phrase; lengths in metres where the scene's scale is known."""
     metres = scene.record.metric_scale
     return [
-        {"view": view, **answer_fields(answer, metres or 1.0), "unit": "m" if metres else "scene"}
+        {
+            "view": None if view is None else view + 1,
+            **answer_fields(answer, metres or 1.0),
+            "unit": "m" if metres else "scene",
+        }
         for view, result in zip(views, results, strict=True)
         for answer in result.answers
     ]
@@ -69,7 +73,7 @@ def write_rows(path: Path, rows: Sequence[dict[str, Any]]) -> None:
 
 
 def _node(row: dict[str, Any]) -> str:
-    return row["prompt"] if row["view"] is None else f"{row['prompt']} (view {row['view']})"
+    return row["prompt"] if row["view"] is None else f"{row['prompt']} (photo {row['view']})"
 
 
 def _flat(row: dict[str, Any]) -> dict[str, Any]:

@@ -62,8 +62,8 @@ class CameraChoice:
         """
         if not 0 <= view < scene.num_views:
             raise ViewError(
-                f"there is no view {view}: this scene has {scene.num_views}, counted from 0; "
-                f"use --view 0{_last(scene.num_views)}"
+                f"there is no photo {view + 1}: this scene has {scene.num_views}; "
+                f"use --view 1{_last(scene.num_views)}"
             )
         size = self.size or (kept_size(scene, view) if self.full else scene.view_size)
         return lit_camera(scene, self._by_rays(scene.camera(view, *size), scene))
@@ -206,4 +206,4 @@ def _determinant(m: Matrix) -> float:
 
 
 def _last(num_views: int) -> str:
-    return f" to {num_views - 1}" if num_views > 1 else ""
+    return f" to {num_views}" if num_views > 1 else ""

@@ -246,5 +246,5 @@ def read_key_frames(path: Path, seconds: float | None) -> tuple[list[Camera], li
     if not rising or numbers[-1] - numbers[0] > LONGEST:
         raise ViewError(f"{path}: times must rise, all of them given, over at most {LONGEST:g} seconds")
     if seconds is not None:
-        raise ViewError(f"{path} says its times; leave --seconds away")
+        raise ViewError(f"{path} says its times; leave --seconds out")
     return cameras, [number - numbers[0] for number in numbers]

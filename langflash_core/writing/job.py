@@ -61,14 +61,14 @@ class Job:
         """Whether no view is named, so that every photo's is meant."""
         return self.request.view is None and self.request.camera is None
 
-    def cameras(self, full: bool = False) -> list[Camera]:
-        """Those that it is seen from: one, or all photos'. full: as large as the photos that the scene keeps,
-        where no size is said.
+    def cameras(self) -> list[Camera]:
+        """Those that it is seen from: one, or all photos'; as large as the photos that the scene keeps, where
+        no size is said.
 
         Raises:
             ViewError: the scene has no such view.
         """
-        choice = self.choice.at_full_size() if full else self.choice
+        choice = self.choice.at_full_size()
         if (self.request.all_views or self.kind.every) and self.of_photos:
             return [choice.of_photo(self.scene, view) for view in range(self.scene.num_views)]
         return [choice.of(self.scene)]

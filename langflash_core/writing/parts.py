@@ -19,7 +19,7 @@ def write_parts(job: Job) -> str:
     Raises:
         LangFlashError: nothing answers, or a picture cannot be written.
     """
-    cameras = job.cameras(full=True)
+    cameras = job.cameras()
     targets = job.targets(cameras)
     with job.renderer() as renderer:
         numbers = [None] * len(cameras)

@@ -55,7 +55,7 @@ class Reply:
             "scene": self.scene,
             **answer_fields(self.answer, self.metres or 1.0),
             "unit": "m" if self.metres else "scene",
-            "view": self.view,
+            "view": self.view + 1,  # as people count
             "photo": self.photo,
             "picture": self.picture,
         }

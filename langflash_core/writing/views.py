@@ -22,7 +22,7 @@ def write_pictures(job: Job) -> str:
     Raises:
         LangFlashError: nothing answers, or a picture cannot be written.
     """
-    cameras = job.cameras(full=True)
+    cameras = job.cameras()
     targets = job.targets(cameras)
     answers: list[Answers] = []
     with job.renderer() as renderer, staged_folder(job.request.output.parent) as staging:
@@ -68,7 +68,7 @@ def write_depth(job: Job) -> str:
     Raises:
         LangFlashError: a file cannot be written, or the package for it is missing.
     """
-    cameras = job.cameras(full=True)
+    cameras = job.cameras()
     targets = job.targets(cameras)
     metres = job.scene.record.metric_scale
     unit, maps = depth.unit_name(metres), []
@@ -121,7 +121,7 @@ def write_coco_masks(job: Job) -> str:
     Raises:
         LangFlashError: nothing answers, or a file cannot be written.
     """
-    cameras, output = job.cameras(full=True), job.request.output
+    cameras, output = job.cameras(), job.request.output
     job.targets(cameras)
     names = [picture.name for picture in job.kind.files_beside(output, len(cameras))]
     answers: list[Answers] = []

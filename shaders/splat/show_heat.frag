@@ -4,6 +4,7 @@
 
 #include "colormaps.glsl"
 #include "gaps.glsl"
+#include "glow.glsl"
 #include "luma.glsl"
 
 uniform sampler2D colour;
@@ -11,7 +12,7 @@ uniform sampler2DArray relevance;  // PHRASES_A_LAYER each
 uniform int prompt;
 uniform float threshold;
 uniform vec2 span;                 // relevance shown as the first and the last colour
-uniform float opacity;             // of the heat where it is shown; 1: alone
+uniform float opacity;             // of the heat where the photo is white; 1: alone
 
 out vec4 out_colour;
 
@@ -23,7 +24,7 @@ void main() {
     vec3 heat = colour_map((value - span.x) / max(span.y - span.x, 1e-6));
     float grey = luma(rgb);
     vec3 under = mix(rgb, vec3(0.5 * grey), opacity < 1.0 ? 0.6 : 1.0);
-    vec3 over = mix(rgb, heat, opacity);
+    vec3 over = mix(rgb, heat, glow_share(grey, opacity));
     bool shown = value >= threshold && photo.a >= COVERED_ALPHA;
     vec3 hidden = opacity < 1.0 ? under : vec3(0.0);
     out_colour = vec4(shown ? over : hidden, 1.0);

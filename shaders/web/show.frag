@@ -6,6 +6,7 @@
 
 precision highp float;
 
+#include "glow.glsl"
 #include "luma.glsl"
 
 uniform sampler2D colours;   // premultiplied
@@ -37,7 +38,7 @@ void main() {
         float glow = clamp((value - 0.5 * (neutral + threshold)) / (threshold - neutral), 0.0, 1.0);
         float grey = luma(view);
         vec3 colour = heat(0.4 + 0.6 * (value - threshold) / max(1.0 - threshold, 1e-6));
-        vec3 lit = GLOW * colour * (0.35 + 0.65 * grey) + (1.0 - GLOW) * view;
+        vec3 lit = mix(view, colour, glow_share(grey, GLOW));
         view = mix(DIM * (0.7 * vec3(grey) + 0.3 * view), lit, glow);
     }
     out_colour = vec4(view, 1.0);

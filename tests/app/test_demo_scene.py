@@ -91,7 +91,7 @@ def test_reconstruct_then_query_from_the_command_line(tmp_path):
     assert done.returncode == 0, done.stderr
     report = json.loads(done.stdout)
     assert report["views"] == 2 and report["gaussians"] > 10_000 and report["atoms"] >= 1
-    done = _langflash("query", scene, "book", "floor", "--view", 0, "-o", out, "--json", "--npz")
+    done = _langflash("query", scene, "book", "floor", "--view", 1, "-o", out, "--json", "--npz")
     assert done.returncode == 0, done.stderr
     answers = json.loads(done.stdout)["prompts"]
     assert [answer["prompt"] for answer in answers] == ["book", "floor"]

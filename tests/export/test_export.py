@@ -2,6 +2,7 @@
 
 import json
 import os
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -84,6 +85,29 @@ def test_heat_over_a_view_glows_only_where_the_phrase_is(mode, threshold):
     # The scale does not depend on what else is in the map.
     alone = png.heat_over(relevance[:, 1:2], view[:, 1:2], threshold, mode)
     assert torch.equal(alone[0, 0], edge)
+
+
+def luminance(colour: torch.Tensor) -> float:
+    """Relative luminance of an sRGB colour (3,), as WCAG 2 has it."""
+    linear = torch.where(colour <= 0.04045, colour / 12.92, ((colour + 0.055) / 1.055) ** 2.4)
+    return float(linear @ torch.tensor([0.2126, 0.7152, 0.0722]))
+
+
+@pytest.mark.parametrize("brightness", [0.0, 0.05, 0.1, 0.2])
+def test_what_is_found_in_a_dark_room_is_seen(brightness):
+    """In a room of this brightness heat was multiplied by it: 1.2 : 1 beside what is not found."""
+    view = torch.full((1, 2, 3), brightness)
+    nothing, thing = png.heat_over(torch.tensor([[0.0, 0.7]]), view, 0.6, "relevancy")[0]
+    assert (luminance(thing) + 0.05) / (luminance(nothing) + 0.05) > 2.0
+
+
+def test_labels_do_not_float_on_black(result):
+    """A gap in the scene shows, dimmed, what is around it."""
+    grey, alphas = torch.full((HEIGHT, WIDTH, 3), 0.8), torch.ones(HEIGHT, WIDTH)
+    alphas[10:13, 5:8] = 0
+    frame = replace(result.frame, rgb=grey * alphas[..., None], alphas=alphas)
+    labels = png.label_picture(replace(result, frame=frame, masks=torch.zeros_like(result.masks)))
+    np.testing.assert_allclose(labels, round(0.4 * 0.8 * 255), atol=1)
 
 
 def test_labels_and_their_legend_agree(tmp_path, result):

@@ -389,12 +389,24 @@ def test_a_phrase_that_the_vocabulary_lacks_is_answered(page, reading, scene):
     assert page.errors == []
 
 
-@pytest.mark.parametrize("fragment", ["#view=length", "#view=map&ask=plant", "#view=-1&mode=photo", "#%"])
+@pytest.mark.parametrize(
+    "fragment", ["#view=length", "#view=map&ask=plant", "#view=-1&mode=photo", "#photo=0", "#%"]
+)
 def test_an_address_that_names_no_view_shows_the_first(page, file, fragment):
     """`views["length"]` is there, and no view: the page stayed empty."""
     page.open(file, (200, 150), fragment)
     assert page.value("langflash.then((page) => page.orbit.turn.length)") == 3
     assert page.errors == []
+
+
+def test_an_address_counts_photos_from_1(tmp_path):
+    """Addresses of before say `view`, from 0, and mean what they meant."""
+    said = {"photo=2": 1, "photo=1": 0, "photo=0": -1, "photo=3": -1, "view=1": 1, "view=0": 0, "view=2": -1}
+    script = address.READER.read_text("utf-8")
+    with address.browser(tmp_path) as page:
+        page.value(f"globalThis.reader = (() => {{ {script}; return readAddress }})(); 0")
+        for fragment, view in said.items():
+            assert page.value(f"reader({'#' + fragment!r}, 2, [], []).view") == view, fragment
 
 
 def test_addresses_at_random(tmp_path):

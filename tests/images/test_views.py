@@ -119,8 +119,12 @@ def test_exif_decides_when_nothing_is_given(tmp_path):
     focal = 28 / np.hypot(36, 24) * 500
     scale = max(views.size[0] / 400, views.size[1] / 300)  # the crop keeps the tighter side
     assert float(views.Ks[0, 0, 0]) == pytest.approx(focal * scale, rel=1e-4)
-    assumed = [note for note in views.warnings if note.startswith("assumed field of view 65 degrees")]
-    assert len(assumed) == 1 and "unknown.jpg does" in assumed[0] and "known.jpg and" not in assumed[0]
+    assumed = [note for note in views.warnings if "a field of view of 65° is assumed" in note]
+    assert (
+        len(assumed) == 1
+        and assumed[0].startswith("unknown.jpg does not")
+        and "known.jpg and" not in assumed[0]
+    )
     assert not [note for note in load_views([unknown], fov=60).warnings if "assumed" in note]
 
 

@@ -102,10 +102,10 @@ def test_a_found_lens_is_one_line():
 @pytest.mark.parametrize(
     ("shares", "said"),
     [
-        ([0, 0, 0.0612], "6 % of photo 2"),
-        ([0.3, 0.001, 0], "30 % of photo 0, 1 % of photo 1"),
-        ([0.1, 0.2, 0.05, 0.3, 0.4, 0.02], "10 % of photo 0, 20 % of photo 1, 30 % of photo 3, 40 % of photo 4 and some of 2 others"),  # noqa: E501
-        ([0.1, 0.2, 0.05, 0.3, 0.4], "10 % of photo 0, 20 % of photo 1, 30 % of photo 3, 40 % of photo 4 and some of another one"),  # noqa: E501
+        ([0, 0, 0.0612], "6 % of photo 3"),
+        ([0.3, 0.001, 0], "30 % of photo 1, 1 % of photo 2"),
+        ([0.1, 0.2, 0.05, 0.3, 0.4, 0.02], "10 % of photo 1, 20 % of photo 2, 30 % of photo 4, 40 % of photo 5 and some of 2 others"),  # noqa: E501
+        ([0.1, 0.2, 0.05, 0.3, 0.4], "10 % of photo 1, 20 % of photo 2, 30 % of photo 4, 40 % of photo 5 and some of another one"),  # noqa: E501
         ([0.0, 0.0], ""),
         ([], ""),
         (["much"], ""),
@@ -121,10 +121,10 @@ def test_what_was_left_out_is_one_line(shares, said):
     ("names", "said"),
     [
         (("sofa.jpg", "a/desk.jpg"), "25 % of a/desk.jpg"),
-        (("same.jpg", "same.jpg"), "25 % of photo 1"),
-        (("a.jpg", 50 * "b"), "25 % of photo 1"),
-        (("a.jpg",), "25 % of photo 1"),
-        (("", "b.jpg"), "25 % of photo 1"),
+        (("same.jpg", "same.jpg"), "25 % of photo 2"),
+        (("a.jpg", 50 * "b"), "25 % of photo 2"),
+        (("a.jpg",), "25 % of photo 2"),
+        (("", "b.jpg"), "25 % of photo 2"),
     ],
 )
 def test_photos_are_called_by_their_names_where_those_tell_them_apart(names, said):

@@ -28,7 +28,7 @@ _FUZZ = """
     "%00", "+", "plant", "length",
     "map", "constructor", "__proto__", "toString", "0", "1", "-1", "1e9", "99999999999999999999", "0x1", " 1",
     "1.5", "NaN", "Infinity", "photo", "heat", "\\ud800", "\\u202e", "\\u0000", "<script>", "[]",
-    "view=length", "view=1", "?", ";"];
+    "view=length", "view=1", "photo=1", "photo=0", "?", ";"];
   const finds = [];
   for (let number = 0; number < COUNT && finds.length < 5; number++) {
     let hash = random(9) ? "#" : "";

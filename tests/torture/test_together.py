@@ -39,7 +39,7 @@ def test_two_windows_that_die_together_are_both_had_back(own):
 
 def test_what_another_window_has_taken_over_is_a_sentence(own):
     kept = LoadScene(own / "a.langflash", own / "a.edits")
-    with pytest.raises(SceneFileError, match="another window goes on with it"):
+    with pytest.raises(SceneFileError, match="another window is using it"):
         kept.run(1, lambda *_: None, lambda: False)
 
 

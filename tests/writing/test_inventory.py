@@ -110,7 +110,7 @@ def test_the_page_needs_nothing_else_and_says_names_as_they_are(folder):
 
 
 def test_people_count_photos_from_1(folder):
-    """As in the window; tables for programs count from 0, as `--view` does."""
+    """In tables as well; indices from 0 are for Python alone."""
     page = (folder / "room.html").read_text(encoding="utf-8")
     seen = {number for cell in re.findall(r'<td class="photos">([^<]*)', page) for number in cell.split(", ")}
     assert seen == {"1", "2"}
@@ -118,7 +118,7 @@ def test_people_count_photos_from_1(folder):
     assert re.findall("<title>Photo (.)</title>", plan) == ["1", "2"]
     assert "where the photos were taken" in plan
     things = json.loads((folder / "room.json").read_text(encoding="utf-8"))["things"]
-    assert {view for thing in things for view in thing["photos"]} == {0, 1}
+    assert {view for thing in things for view in thing["photos"]} == {1, 2}
 
 
 def test_a_scene_of_walls_alone_has_a_plan_and_an_empty_list(tmp_path):

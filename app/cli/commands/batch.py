@@ -136,7 +136,7 @@ def _told(
     else:
         print(_sentence(document), file=out)
     if stopped:
-        say_error("stopped; the same command goes on from here")
+        say_error("stopped; the same command continues from here")
         return INTERRUPTED
     return int(failed > 0)
 

@@ -77,7 +77,7 @@ def _lines(document: dict[str, Any], report: "Hidden") -> list[str]:
     if report.photos_left_out:
         lines.append("  the photos were left out of the file")
     lines += [
-        f"  photo {view}: {share:.1%} of its pixels painted over" for view, share in report.photos.items()
+        f"  photo {view + 1}: {share:.1%} of its pixels painted over" for view, share in report.photos.items()
     ]
     if report.names:
         lines.append(f"  names that went with it: {', '.join(report.names)}")

@@ -113,7 +113,7 @@ def _lines(found: "Inventory") -> list[str]:
     rows = [("what", f"width × depth × height, {found.unit}", "sure", "photos")]
     for thing in found.things:
         name = thing.title + (f" ({thing.id})" if thing.name else "") + ("" if thing.sure >= SURE else "?")
-        photos = ", ".join(map(str, thing.photos))
+        photos = ", ".join(str(view + 1) for view in thing.photos)
         measured = size(thing, "").strip() + (" and more" if thing.cut else "")
         rows.append((name, measured, f"{thing.sure:.0%}", photos))
     widths = [max(len(row[column]) for row in rows) for column in range(4)]

@@ -55,9 +55,9 @@ def run(args: Namespace, out: TextIO) -> None:
     known = scene.record.metric_scale
     print(f"{document['scene']}: {world_line(world, known)}", file=out)
     if known:
-        print(f"a unit is {known:.4g} m, as you told it", file=out)
+        print(f"1 unit = {known:.4g} m, as you said", file=out)
     elif world.guess is not None:
-        print("tell a length, --ceiling or --door, and the scene is in metres", file=out)
+        print("give --length, --ceiling or --door to set the scale", file=out)
 
 
 def _write(scene: "Scene", output: Path) -> None:
@@ -76,12 +76,16 @@ def _place(scene: "Scene", text: str) -> tuple[float, float, float]:
     from langflash_core.level import seen_at
 
     pixel = _PIXEL.fullmatch(text)
+    if pixel and int(pixel[1]) == 0:
+        raise InputError(
+            f"photos count from 1; {text} of --length names none, 1:{pixel[2]},{pixel[3]} the first"
+        )
     if pixel:
-        return seen_at(scene, int(pixel[1]), float(pixel[2]), float(pixel[3]))
+        return seen_at(scene, int(pixel[1]) - 1, float(pixel[2]), float(pixel[3]))
     try:
         x, y, z = map(float, text.split(","))
     except ValueError:
-        raise InputError(f"--length takes points X,Y,Z or pixels VIEW:U,V; received {text!r}") from None
+        raise InputError(f"--length takes points X,Y,Z or pixels PHOTO:U,V; received {text!r}") from None
     return x, y, z
 
 

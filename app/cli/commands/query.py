@@ -63,7 +63,8 @@ def _one_scene(
         )
         progress("writing", 0.8)
         files = [{} for _ in result.answers] if args.output is None else _written(args, result)
-    document = {"scene": str(path), "view": choice.view, "backend": renderer.backend}
+    number = None if choice.view is None else choice.view + 1  # as people count
+    document = {"scene": str(path), "view": number, "backend": renderer.backend}
     document.update(answers_document(scene, result, files))
     say_warnings(dict.fromkeys(answer.note for answer in result.answers if answer.note))
     if args.json:

@@ -32,7 +32,7 @@ def run(args: Namespace, out: TextIO) -> int:
         readable_file(args.weights, "checkpoint", WeightsError)
     check_output_file(args.output, (".langflash",), inputs=args.photos)
     if args.poses and (args.fov is not None or args.intrinsics is not None):
-        raise InputError("--poses says the lens too; leave --fov and --intrinsics away")
+        raise InputError("--poses says the lens too; leave --fov and --intrinsics out")
     with ProgressBar() as progress:
         args.photos, films, notes = with_frames(
             args.photos, progress, most=args.frames, start=args.start, end=args.end
@@ -42,7 +42,7 @@ def run(args: Namespace, out: TextIO) -> int:
     except KeyboardInterrupt:
         if args.keep is None or not holds_steps(args.keep):
             raise
-        say_error(f"stopped; what is done is kept in {args.keep}, the same command goes on from there")
+        say_error(f"stopped; progress is saved in {args.keep}, the same command continues from there")
         return INTERRUPTED
     from langflash_core.scene.report import describe, world_line
 
@@ -94,7 +94,7 @@ def _written(args: Namespace, films: Sequence[dict[str, Any]]) -> "Scene":
 
         def told(stage: str, fraction: float) -> None:
             if ahead.gone_on and not said:
-                said.append(f"going on from what an earlier run kept in {args.keep}")
+                said.append(f"continuing from the progress saved in {args.keep}")
                 progress.say(said[0])
             progress(stage, fraction)
 

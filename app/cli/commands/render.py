@@ -29,7 +29,7 @@ def run(args: Namespace, out: TextIO) -> None:
     picture, word, atom = args.what
     prompts = _prompts_for(picture, word, args.prompt)
     if args.fill and not picture.fills:
-        raise InputError(f"--what {word} shows no colours to fill gaps with; leave --fill away")
+        raise InputError(f"--what {word} shows no colours to fill gaps with; leave --fill out")
     choice = chosen_camera(args).at_full_size()
     readable_file(args.scene, "scene", SceneFileError)
     check_output_file(args.output, (".png",), inputs=[args.scene])

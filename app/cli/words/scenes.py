@@ -39,7 +39,7 @@ from .shared import (
 
 def add_view(commands) -> None:
     """`langflash view`."""
-    view = new_command(commands, "view", "open the window; photos, films and scenes can be dropped on it")
+    view = new_command(commands, "view", "open the window; drop photos, films or scenes on it")
     view.add_argument(
         "paths", nargs="*", type=Path, metavar="PHOTO|FILM|SCENE", help="photos, a film, or one scene"
     )
@@ -47,21 +47,18 @@ def add_view(commands) -> None:
 
 def add_reconstruct(commands) -> None:
     """`langflash reconstruct`."""
-    command = new_command(commands, "reconstruct", "make a scene of photos of one place, or of a film of it")
+    command = new_command(commands, "reconstruct", "make a scene from photos or a film of one place")
     command.add_argument(
         "photos",
         nargs="+",
         type=Path,
         metavar="PHOTO|FILM|FOLDER",
-        help="a folder stands for the photos directly in it, in the order of their names, or else for its "
-        "films; of a film its sharpest frames are taken, as `langflash frames` chooses them",
+        help="photos, a film, or a folder: its photos in the order of their names, or its films if it has no "
+        "photos; of a film the sharpest frames are used, as `langflash frames` chooses them",
     )
     add_output(command, "SCENE", "the scene to write")
     command.add_argument(
-        "--frames",
-        type=frame_count,
-        metavar="N",
-        help="of a film, at most so many (default: 32)",
+        "--frames", type=frame_count, metavar="N", help="use at most N frames of a film (default: 32)"
     )
     add_film_part(command)
     add_network(command)
@@ -90,8 +87,8 @@ def add_reconstruct(commands) -> None:
         "--refine",
         type=above_zero,
         metavar="SECONDS",
-        help="then fit poses and one surface of Gaussians, without layers, to the photos, and keep that if a "
-        "held-out view improves",
+        help="then spend SECONDS fitting poses and one surface of Gaussians, without layers, to the photos; "
+        "kept only if a held-out photo improves",
     )
     lens = command.add_mutually_exclusive_group()
     lens.add_argument("--fov", type=open_fov, metavar="DEG", help="field of view of the photos' longer side")
@@ -99,20 +96,20 @@ def add_reconstruct(commands) -> None:
         "--intrinsics",
         type=intrinsics,
         metavar="FX,FY,CX,CY",
-        help="in pixels of the photos as given, after EXIF orientation",
+        help="the lens, in pixels of the photos as given, after EXIF orientation",
     )
     command.add_argument(
         "--poses",
         type=Path,
         metavar="PATH",
-        help="a transforms.json or COLMAP model with the photos' poses and lenses: they are not sought, "
-        "and the scene is in their world and unit",
+        help="use the poses and lenses of this transforms.json or COLMAP model instead of finding them; the "
+        "scene is then in their world and unit",
     )
     command.add_argument(
         "--keep",
         type=Path,
         metavar="FOLDER",
-        help="what is done is kept there until the scene is written: the same command goes on from there",
+        help="save progress there until the scene is written; the same command continues from it",
     )
     add_json(command)
 
@@ -122,25 +119,25 @@ def add_frames(commands) -> None:
     command = new_command(
         commands,
         "frames",
-        "take the sharpest frames of a film as photos, spaced by how far the picture moves",
-        epilog="A film that was looked at is not decoded again. Frames are at most 1920 pixels long.",
+        "pick the sharpest frames of a film as photos, spaced by how far the camera moves",
+        epilog="A film is decoded only once. Frames are at most 1920 pixels long.",
     )
     command.add_argument("film", type=Path, metavar="FILM", help=".mp4, .mov, .mkv, .webm, .avi and others")
-    add_output(command, "FOLDER", "gets the frames, named by their times, and frames.json")
+    add_output(command, "FOLDER", "the folder to write: frames, named by their times, and frames.json")
     command.add_argument(
         "--most",
         type=frame_count,
         metavar="N",
-        help="at most so many (default: 32, as `langflash reconstruct` takes)",
+        help="at most N frames (default: 32, as for `langflash reconstruct`)",
     )
     add_film_part(command)
     command.add_argument(
         "--every",
         type=above_zero,
         metavar="S",
-        help="the sharpest frame of every so many seconds, however far the picture moves",
+        help="the sharpest frame every S seconds, however far the camera moves",
     )
-    command.add_argument("--sheet", type=Path, metavar="IMG", help="a .png or .jpg that shows all of them")
+    command.add_argument("--sheet", type=Path, metavar="IMG", help="also write them as one .png or .jpg")
     add_json(command)
 
 
@@ -149,7 +146,7 @@ def add_batch(commands) -> None:
     command = new_command(
         commands,
         "batch",
-        "make scenes of many sets of photos; what is done is not done again, also after an interruption",
+        "make scenes from many sets of photos; continues where it was interrupted",
         epilog="The exit code is 0 when all sets are done, 1 when some failed (ledger.csv says why), "
         "2 for bad input, 130 after Ctrl-C.",
     )
@@ -157,12 +154,12 @@ def add_batch(commands) -> None:
         "sets",
         type=Path,
         metavar="SETS",
-        help="a folder with a sub-folder of photos a place, or a .csv: per row a name and its photos, "
-        "relative to the table",
+        help="a folder with one sub-folder of photos per place, or a .csv with a name and its photos per "
+        "row, relative to the table",
     )
-    add_output(command, "OUT", "gets a folder a set, ledger.csv and summary.html")
+    add_output(command, "OUT", "the folder to write: one folder per set, ledger.csv and summary.html")
     command.add_argument(
-        "--prompt", nargs="+", metavar="PHRASE", help="answer these in each set's first view"
+        "--prompt", nargs="+", metavar="PHRASE", help="look for these in the first photo of each set"
     )
     command.add_argument(
         "--export",
@@ -175,19 +172,19 @@ def add_batch(commands) -> None:
         "--workers",
         type=whole_count,
         metavar="N",
-        help="processes side by side, which share the processors; each needs about 1 GB "
-        "(default: one a processor, as memory allows)",
+        help="number of processes side by side; each needs about 1 GB "
+        "(default: one per processor, as memory allows)",
     )
     command.add_argument(
         "--address",
         metavar="RAY",
-        help="a Ray cluster instead of processes: host:port, auto, or local to begin one here; all its "
-        "machines see photos and OUT under the same paths",
+        help="use a Ray cluster instead of processes: host:port, auto, or local to start one here; all its "
+        "machines must see the photos and OUT under the same paths",
     )
     add_network(command)
     add_detail(command)
     command.add_argument(
-        "--fov", type=open_fov, metavar="DEG", help="field of view of the photos' longer side, of all sets"
+        "--fov", type=open_fov, metavar="DEG", help="field of view of the photos' longer side, for all sets"
     )
     add_backend(command)
     add_json(command)
@@ -196,7 +193,7 @@ def add_batch(commands) -> None:
 def add_query(commands) -> None:
     """`langflash query`."""
     command = new_command(
-        commands, "query", "find phrases in a scene: a line each; with -o also heat-maps and masks"
+        commands, "query", "find phrases in a scene; with -o also writes heat-maps and masks"
     )
     command.add_argument("scene", nargs="?", metavar="SCENE", help="the scene to ask")
     command.add_argument("phrases", nargs="*", metavar="PROMPT", help='a phrase, e.g. "armchair"')
@@ -204,21 +201,21 @@ def add_query(commands) -> None:
         "--scenes",
         type=Path,
         metavar="FOLDER",
-        help="ask all scenes of a folder: a table of answers, the surest first, and a page of pictures",
+        help="ask all scenes in a folder: a table of answers, surest first, and a page of pictures",
     )
     command.add_argument(
         "--prompts",
         dest="phrase_file",
         type=Path,
         metavar="FILE",
-        help="phrases from a text file, one a line",
+        help="read phrases from a text file, one per line",
     )
     command.add_argument(
         "--words",
         dest="vocabulary",
         type=Path,
         metavar="FILE",
-        help="what `langflash words learn` kept: groups that look alike answer to it",
+        help="use the names that `langflash words learn` saved",
     )
     add_camera(command)
     command.add_argument(
@@ -228,10 +225,10 @@ def add_query(commands) -> None:
         "--negatives",
         nargs="+",
         metavar="PHRASE",
-        help="what relevancy compares with (default: the language space's own)",
+        help="phrases that relevancy compares with (default: the language space's own)",
     )
     add_backend(command)
-    add_output(command, "DIR", "folder for pictures; without it nothing is written", required=False)
+    add_output(command, "DIR", "the folder for pictures (default: none are written)", required=False)
     add_json(command)
     command.add_argument(
         "--npz", action="store_true", help="also write relevance, masks, depth and rgb as arrays"
@@ -253,7 +250,7 @@ def add_render(commands) -> None:
         help="(default: rgb)",
     )
     command.add_argument(
-        "--prompt", nargs="+", metavar="PHRASE", help="for relevance (one) and labels (any number)"
+        "--prompt", nargs="+", metavar="PHRASE", help="phrases for relevance (one) and labels (any number)"
     )
     add_shown(command)
     add_colours(command)
@@ -265,7 +262,7 @@ def add_render(commands) -> None:
 def add_export(commands) -> None:
     """`langflash export`."""
     command = new_command(
-        commands, "export", "write a scene, or what answers a phrase, as a file for other programs"
+        commands, "export", "write a scene, or what a phrase finds, as a file for other programs"
     )
     command.add_argument("scene", type=Path, metavar="SCENE")
     add_output(
@@ -277,10 +274,10 @@ def add_export(commands) -> None:
         "--prompt",
         nargs="+",
         metavar="PHRASE",
-        help="keep only what answers one of these; of an .html: shown as asked",
+        help="keep only what these find; in an .html they are shown as asked",
     )
     command.add_argument(
-        "--threshold", type=kept_fraction, metavar="T", help="relevancy to keep, between 0 and 1"
+        "--threshold", type=kept_fraction, metavar="T", help="keep what scores at least T, between 0 and 1"
     )
     command.add_argument(
         "--what",
@@ -290,49 +287,47 @@ def add_export(commands) -> None:
     command.add_argument(
         "--segmented",
         action="store_true",
-        help="a folder: of every photo's view masks, soft masks, cut-outs and instances of --prompt, and "
-        "depth; boxes, surfaces, a contact sheet and manifest.json",
+        help="write a folder: masks, soft masks, cut-outs and instances of --prompt and depth for every "
+        "photo, boxes, surfaces, a contact sheet and manifest.json",
     )
     add_colours(command)
     command.add_argument(
-        "--all-views", action="store_true", help="from every photo: FILE_0, FILE_1 and so on"
+        "--all-views", action="store_true", help="one file per photo: FILE_1, FILE_2 and so on"
     )
-    command.add_argument(
-        "--with-text", action="store_true", help="an .html answers any phrase, and is 28 MB larger"
-    )
+    command.add_argument("--with-text", action="store_true", help="an .html answers any phrase; adds 28 MB")
     command.add_argument(
         "--beside",
         nargs="+",
         type=Path,
         default=(),
         metavar="SCENE",
-        help="other scenes in the same .html, which are asked the same phrases",
+        help="add other scenes to the same .html; they are asked the same phrases",
     )
     command.add_argument(
         "--detail",
         choices=EXPORT_DETAILS,
         default=EXPORT_DETAILS[0],
-        help="of Gaussians and web pages: low keeps the coarse ones alone, for small files, slow machines; "
-        f"of a scene without levels a third, wider (default: {EXPORT_DETAILS[0]})",
+        help="low keeps only coarse Gaussians, for small files and slow machines; in a scene without levels "
+        f"it keeps a third, made wider (default: {EXPORT_DETAILS[0]})",
     )
     command.add_argument(
         "--upright",
         action="store_true",
-        help="of Gaussians and poses: level, on the floor and turned north as `langflash level` found it, in "
-        "metres where they are known",
+        help="write Gaussians and poses level, on the floor and turned north, as `langflash level` found, in "
+        "metres if they are known",
     )
     command.add_argument("--seconds", type=film_seconds, metavar="S", help="length of a video (default: 6)")
     command.add_argument(
         "--path",
         metavar="WAY",
-        help="of a video: photos, from one to the next and back (default); orbit, around what is shown; "
-        "tour, along the scene's stops; or a JSON list of cameras as of --camera, each with its time in "
+        help="how a video moves: photos, from one to the next and back (default); orbit, around the scene; "
+        "tour, along the scene's stops; or a JSON list of cameras as for --camera, each with its time in "
         "seconds, or evenly spread",
     )
     command.add_argument(
         "--replace",
         action="store_true",
-        help="also a .json of another kind, and what has the name of a legend or a COCO picture",
+        help="also replace a .json of another kind, and files named like a legend or a COCO picture",
     )
     add_camera(command)
     add_shown(command)
@@ -342,17 +337,15 @@ def add_export(commands) -> None:
 
 def add_lift(commands) -> None:
     """`langflash lift`."""
-    command = new_command(
-        commands, "lift", "give plain splats groups and a dictionary, so that they answer phrases"
-    )
-    command.add_argument("scene", type=Path, metavar="SCENE", help="a splat file, or a scene to name anew")
-    add_output(command, "SCENE", "the .langflash, or .ply or .glb with its language, to write")
+    command = new_command(commands, "lift", "make a plain splat file answer phrases")
+    command.add_argument("scene", type=Path, metavar="SCENE", help="a splat file, or a scene to teach again")
+    add_output(command, "SCENE", "the .langflash to write, or a .ply or .glb with its language")
     command.add_argument(
         "--photos",
         nargs="+",
         type=Path,
         metavar="PHOTO",
-        help="of the place, with --poses; else views of itself",
+        help="photos of the place, with --poses (default: views of the splats themselves)",
     )
     command.add_argument("--poses", type=Path, metavar="PATH", help="transforms.json, or a COLMAP model")
     command.add_argument(
@@ -360,10 +353,11 @@ def add_lift(commands) -> None:
         choices=("x", "y", "z", "-x", "-y", "-z"),
         default="-y",
         metavar="AXIS",
-        help="of views of itself: the scene's axis that points up: z, or --up=-z and so on (default: -y)",
+        help="the axis that points up, for views of the splats themselves: z, or --up=-z and so on "
+        "(default: -y)",
     )
     command.add_argument(
-        "--weights", type=Path, metavar="PATH", help="a checkpoint instead of the shipped ones"
+        "--weights", type=Path, metavar="PATH", help="use this checkpoint instead of the shipped ones"
     )
     add_axes(command)
     add_backend(command)
@@ -375,8 +369,8 @@ def add_hide(commands) -> None:
     command = new_command(
         commands,
         "hide",
-        "blur, pixelate or remove what answers a phrase, in the scene and its photos, for good",
-        epilog="What was hidden is not in the file that is written. The scene that was read, and "
+        "blur, pixelate or remove what a phrase finds, in the scene and its photos, for good",
+        epilog="The written file no longer holds what was hidden. The scene that was read, and "
         "photos and films on the disk, still show it.",
     )
     command.add_argument("scene", type=Path, metavar="SCENE")
@@ -386,36 +380,33 @@ def add_hide(commands) -> None:
         "--how",
         choices=HOWS,
         default=HOWS[0],
-        help=f"as colours that run together, as large pixels, or not at all (default: {HOWS[0]})",
+        help=f"blurred, as large pixels, or not at all (default: {HOWS[0]})",
     )
     command.add_argument(
         "--blocks",
         type=above_zero,
         metavar="N",
-        help="blur and pixels: blocks along the longest side of the largest thing, 1 to 16 (default: 6)",
+        help="for blur and pixels: blocks along the longest side of the largest thing, 1 to 16 (default: 6)",
     )
     command.add_argument(
         "--margin",
         type=share,
         metavar="SHARE",
-        help="around it, of a photo's longer side: hidden, too (default: 0.02)",
+        help="hide this much around it too, as a share of a photo's longer side (default: 0.02)",
     )
     command.add_argument(
-        "--threshold",
-        type=kept_fraction,
-        metavar="T",
-        help="relevancy from which it is hidden, between 0 and 1",
+        "--threshold", type=kept_fraction, metavar="T", help="hide what scores at least T, between 0 and 1"
     )
     command.add_argument(
         "--open",
         action="store_true",
-        help="remove: leave the hole open instead of filling it by what is around",
+        help="for remove: leave the hole open instead of filling it from what is around it",
     )
     command.add_argument(
         "--photos",
         choices=("painted", "none"),
         default="painted",
-        help="inside the file: painted over where they show it, or left out (default: painted)",
+        help="photos in the file: painted over where they show it, or left out (default: painted)",
     )
     command.add_argument(
         "--preview", type=Path, metavar="IMG", help="a .png: what is hidden, in red, and after"
@@ -429,32 +420,39 @@ def add_clean(commands) -> None:
     command = new_command(
         commands,
         "clean",
-        "take away floaters, sheets, flyaways and crumbs, by strength, by rules, or as a recipe says",
+        "remove floaters, sheets, flyaways and crumbs, by strength, by rules, or by a recipe",
         epilog='A rule is a condition or several: "opacity<.1", "size>.2,depth>5", "photos<2", '
         '"confidence<.2", "colour~#808080:.1". Photos inside the file stay as they are.',
     )
     command.add_argument("scene", type=Path, metavar="SCENE")
     add_output(command, "SCENE", "the .langflash to write")
     command.add_argument(
-        "--strength", type=share, metavar="T", help="0 to 1 (default: 0.5 where nothing else is asked for)"
+        "--strength",
+        type=share,
+        metavar="T",
+        help="how much to remove, 0 to 1 (default: 0.5 without other rules)",
     )
     command.add_argument(
-        "--kinds", nargs="+", choices=KINDS, metavar="KIND", help=f"of {', '.join(KINDS)} (default: all)"
+        "--kinds", nargs="+", choices=KINDS, metavar="KIND", help=f"remove {', '.join(KINDS)} (default: all)"
     )
     command.add_argument(
-        "--where", nargs="+", metavar="RULE", help="also what meets all conditions of one of these"
+        "--where", nargs="+", metavar="RULE", help="also remove what meets all of one of these rules"
     )
-    command.add_argument("--within", nargs="+", metavar="PHRASE", help="only of what answers one of these")
-    command.add_argument("--invert", action="store_true", help="the others instead")
+    command.add_argument("--within", nargs="+", metavar="PHRASE", help="only within what these find")
+    command.add_argument("--invert", action="store_true", help="remove the rest instead")
     command.add_argument(
         "--crop",
         metavar="BOX",
-        help="only what is inside stays: core, room, or --crop=X,Y,Z,X,Y,Z, low and high corner",
+        help="keep only what is inside: core, room, or --crop=X,Y,Z,X,Y,Z, low and high corner",
     )
-    command.add_argument("--recipe", type=Path, metavar="FILE", help="all of that, as a file says")
-    command.add_argument("--save-recipe", type=Path, metavar="FILE", help="a .json, for other scenes")
+    command.add_argument("--recipe", type=Path, metavar="FILE", help="read all of these settings from a file")
+    command.add_argument(
+        "--save-recipe", type=Path, metavar="FILE", help="save these settings as a .json, for other scenes"
+    )
     command.add_argument("--fill", action="store_true", help="fill what was removed from what is around it")
-    command.add_argument("--preview", type=Path, metavar="IMG", help="a .png: what goes, in red, and after")
+    command.add_argument(
+        "--preview", type=Path, metavar="IMG", help="write a .png: what goes, in red, and after"
+    )
     add_axes(command)
     add_backend(command)
     add_json(command)
@@ -465,11 +463,11 @@ def add_level(commands) -> None:
     command = new_command(
         commands,
         "level",
-        "find which way is up, where the floor is, which way is north, and how large it may be",
+        "find which way is up, the floor, north and the likely scale",
     )
     command.add_argument("scene", type=Path, metavar="SCENE")
     command.add_argument(
-        "-o", "--output", type=Path, metavar="SCENE", help="the scene with that in it (default: only say it)"
+        "-o", "--output", type=Path, metavar="SCENE", help="write the scene with it (default: only print it)"
     )
     command.add_argument("--up", type=spot, metavar="X,Y,Z", help="this way is up, in the scene's own axes")
     command.add_argument("--north", type=spot, metavar="X,Y,Z", help="this way is north")
@@ -479,11 +477,11 @@ def add_level(commands) -> None:
         "--length",
         nargs=3,
         metavar=("A", "B", "METRES"),
-        help="from A to B it is so long; A and B are points X,Y,Z of the scene, or pixels VIEW:U,V of a "
-        "photo as the scene has it",
+        help="the distance from A to B; both are points X,Y,Z of the scene, or pixels PHOTO:U,V of a photo "
+        "as the scene has it, photos counted from 1",
     )
-    lengths.add_argument("--ceiling", type=above_zero, metavar="METRES", help="the ceiling is so high")
-    lengths.add_argument("--door", type=above_zero, metavar="METRES", help="the door is so high")
+    lengths.add_argument("--ceiling", type=above_zero, metavar="METRES", help="the height of the ceiling")
+    lengths.add_argument("--door", type=above_zero, metavar="METRES", help="the height of the door")
     add_axes(command)
     add_json(command)
 
@@ -493,7 +491,7 @@ def add_inventory(commands) -> None:
     command = new_command(
         commands,
         "inventory",
-        "list what is in a room, how large, where, how sure; what changed since another scene",
+        "list what is in a room, with size, place and certainty; or what changed since another scene",
     )
     command.add_argument("scene", type=Path, metavar="SCENE")
     command.add_argument(
@@ -502,20 +500,23 @@ def add_inventory(commands) -> None:
         nargs="+",
         type=Path,
         metavar="FILE",
-        help=".html: a page to print, with cut-outs and a plan; .csv, .json: the list; .svg, .dxf: the plan "
-        "from above, to scale; .langflash: the scene with the names of --name",
+        help=".html: a page to print, with cut-outs and a plan; .csv, .json: the list; .svg, .dxf: the floor "
+        "plan, to scale; .langflash: the scene with the names of --name",
     )
     command.add_argument(
         "--name",
         nargs="+",
         metavar='"CHAIR 1=NAME"',
-        help="what you call a thing; nothing after = takes it away",
+        help="your own name for a thing; nothing after = removes it",
     )
     command.add_argument(
-        "--beside", type=Path, metavar="SCENE", help="a later scene of the room: what came, went and moved"
+        "--beside",
+        type=Path,
+        metavar="SCENE",
+        help="a later scene of the same room: list what came, went and moved",
     )
     command.add_argument(
-        "--threshold", type=kept_fraction, metavar="T", help="relevancy of a thing to its name, from 0 to 1"
+        "--threshold", type=kept_fraction, metavar="T", help="list things that score at least T, from 0 to 1"
     )
     add_backend(command)
     add_json(command)
@@ -523,13 +524,13 @@ def add_inventory(commands) -> None:
 
 def add_info(commands) -> None:
     """`langflash info`."""
-    command = new_command(commands, "info", "tell what a scene file holds, and what pruning saved")
+    command = new_command(commands, "info", "show what a scene file holds, and what pruning saved")
     command.add_argument("scene", type=Path, nargs="?", metavar="SCENE", help=".langflash or a splat file")
     command.add_argument(
-        "--sbom", action="store_true", help="what is installed, as a bill of materials (CycloneDX JSON)"
+        "--sbom", action="store_true", help="list what is installed, as a bill of materials (CycloneDX JSON)"
     )
     command.add_argument(
-        "--limits", action="store_true", help="how much readers take of a file, and the variables that say so"
+        "--limits", action="store_true", help="list how large files may be, and the variables that change it"
     )
     add_axes(command)
     add_json(command)
@@ -537,46 +538,50 @@ def add_info(commands) -> None:
 
 def add_words(commands) -> None:
     """`langflash words`."""
-    actions = new_actions(commands, "words", "keep what was taught in some scenes, and teach it to others")
-    learn = new_command(actions, "learn", "names and denials that scenes were given, into a vocabulary")
-    learn.add_argument(
-        "scenes", nargs="+", type=Path, metavar="SCENE", help="scenes in which groups were named"
-    )
-    add_output(learn, "FILE", "the vocabulary, .words.json; one that is there is added to")
+    actions = new_actions(commands, "words", "save the names taught in some scenes, and teach them to others")
+    learn = new_command(actions, "learn", "save the names and denials of scenes as a vocabulary")
+    learn.add_argument("scenes", nargs="+", type=Path, metavar="SCENE", help="scenes whose groups have names")
+    add_output(learn, "FILE", "the vocabulary, .words.json; an existing one is added to")
     add_json(learn)
-    teach = new_command(actions, "teach", "a scene whose groups take what a vocabulary says of such things")
+    teach = new_command(actions, "teach", "name the groups of a scene from a vocabulary")
     teach.add_argument("scene", type=Path, metavar="SCENE")
     teach.add_argument("words", type=Path, metavar="FILE", help="the vocabulary")
     add_output(teach, "SCENE", "the scene to write")
     add_json(teach)
-    listing = new_command(actions, "list", "what a vocabulary holds")
+    listing = new_command(actions, "list", "list what a vocabulary holds")
     listing.add_argument("words", type=Path, metavar="FILE", help="the vocabulary")
     add_json(listing)
 
 
 def add_weights(commands) -> None:
     """`langflash weights`."""
-    actions = new_actions(commands, "weights", "list, fetch and check the checkpoints of the networks")
-    listing = new_command(actions, "list", "name, size and origin of each checkpoint, and what can be had")
+    actions = new_actions(commands, "weights", "list, download and check the checkpoints of the networks")
+    listing = new_command(
+        actions, "list", "name, size and origin of each checkpoint, and which can be downloaded"
+    )
     add_json(listing)
     get = new_command(
         actions, "get", "download a published checkpoint and convert it; continues where it stopped"
     )
-    get.add_argument("name", metavar="NAME", help="as `langflash weights list` has it")
-    get.add_argument("--url", metavar="URL", help="fetch it from there instead")
+    get.add_argument("name", metavar="NAME", help="a name from `langflash weights list`")
+    get.add_argument("--url", metavar="URL", help="download it from there instead")
     get.add_argument("--keep", action="store_true", help="keep the file as it was downloaded")
     add_json(get)
     imported = new_command(actions, "import", "convert a published checkpoint that is already here")
     imported.add_argument("path", type=Path, metavar="PATH", help=".ckpt, .pt or .safetensors")
     imported.add_argument("--preset", choices=("full",), default="full", help="(default: full)")
     imported.add_argument(
-        "-o", "--output", type=Path, metavar="FILE", help="(default: in the cache folder, where it is found)"
+        "-o",
+        "--output",
+        type=Path,
+        metavar="FILE",
+        help="(default: the cache folder, where it is looked for)",
     )
     imported.add_argument(
         "--size",
         type=pixel_side,
         metavar="PX",
-        help="it was trained on photos of PX x PX (default: as its published name tells)",
+        help="the photo size that it was trained on, PX x PX (default: from its published name)",
     )
     add_json(imported)
     verify = new_command(actions, "verify", "read every number and check that it fits its network")

@@ -12,10 +12,10 @@ from ..values import (
     film_time,
     gaussian_count,
     intrinsics,
+    photo_index,
     pixel_side,
     size,
     span,
-    view_index,
 )
 
 
@@ -40,16 +40,19 @@ def add_output(
 def add_network(command: argparse.ArgumentParser) -> None:
     """Which network sees the photos, how large, and where."""
     command.add_argument(
-        "--preset", choices=("mini", "full"), default="mini", help="which network (default: mini)"
+        "--preset", choices=("mini", "full"), default="mini", help="which network to use (default: mini)"
     )
     command.add_argument(
-        "--weights", type=Path, metavar="PATH", help="a checkpoint instead of the shipped or imported ones"
+        "--weights",
+        type=Path,
+        metavar="PATH",
+        help="use this checkpoint instead of the shipped or imported ones",
     )
     command.add_argument(
         "--size",
         type=pixel_side,
         metavar="PX",
-        help="the network sees about PX x PX pixels (default: 224; full: 256)",
+        help="resize photos to about PX x PX pixels for the network (default: 224; full: 256)",
     )
     command.add_argument("--device", choices=("auto", "cpu", "cuda"), default="auto")
 
@@ -62,10 +65,10 @@ def add_film_part(command: argparse.ArgumentParser) -> None:
         type=film_time,
         default=0.0,
         metavar="S",
-        help="seconds of the film to leave out first",
+        help="start at this second of the film",
     )
     command.add_argument(
-        "--to", dest="end", type=film_time, metavar="S", help="the film's second that is the last to count"
+        "--to", dest="end", type=film_time, metavar="S", help="stop at this second of the film"
     )
 
 
@@ -75,14 +78,14 @@ def add_detail(command: argparse.ArgumentParser) -> None:
         "--detail",
         choices=tuple(DETAILS),
         default=DEFAULT_DETAIL,
-        help="how fine the scene is: normal has some 140,000 Gaussians for two photos, high 1.4 times as "
-        f"many, low a third; preset mini (default: {DEFAULT_DETAIL})",
+        help="how fine the scene is: normal makes about 140,000 Gaussians from two photos, high 1.4 times as "
+        f"many, low a third; preset mini only (default: {DEFAULT_DETAIL})",
     )
     command.add_argument(
         "--gaussians",
         type=gaussian_count,
         metavar="N",
-        help=f"about so many Gaussians, {FEWEST:,} to {MOST:,}, instead of as many as --detail has",
+        help=f"make about N Gaussians, {FEWEST:,} to {MOST:,}, instead of what --detail says",
     )
 
 
@@ -92,42 +95,44 @@ def add_colours(command: argparse.ArgumentParser) -> None:
         "--colormap",
         choices=COLOUR_MAPS,
         default=COLOUR_MAPS[0],
-        help=f"of heat-maps (default: {COLOUR_MAPS[0]}, which colour-blind eyes read too)",
+        help=f"colours of heat-maps (default: {COLOUR_MAPS[0]}, readable for colour-blind eyes)",
     )
     command.add_argument(
-        "--span", type=span, metavar="LOW,HIGH", help="relevance of its first and last colour"
+        "--span", type=span, metavar="LOW,HIGH", help="relevance that the first and the last colour stand for"
     )
 
 
 def add_camera(command: argparse.ArgumentParser) -> None:
     """From where, and how large."""
     camera = command.add_mutually_exclusive_group()
-    camera.add_argument("--view", type=view_index, metavar="N", help="that photo's pose, from 0 (default: 0)")
     camera.add_argument(
-        "--camera", type=Path, metavar="FILE", help="JSON with viewmat (4 x 4), K (3 x 3), width and height"
+        "--view", type=photo_index, metavar="N", help="look from this photo, counted from 1 (default: 1)"
+    )
+    camera.add_argument(
+        "--camera",
+        type=Path,
+        metavar="FILE",
+        help="look from this camera: JSON with viewmat (4 x 4), K (3 x 3), width and height",
     )
     command.add_argument(
         "--size",
         type=size,
         metavar="WxH",
-        help="pixels to draw (default: of pictures as many as the photo in the scene has; of boxes and "
-        "--segmented as the network saw it)",
+        help="size in pixels (default: that of the photo in the scene)",
     )
     command.add_argument(
         "--ortho",
         action="store_const",
         const=True,
-        help="parallel rays instead of perspective, at the scale of the picture's middle",
+        help="orthographic (parallel rays) instead of perspective, at the scale of the picture's middle",
     )
 
 
 def add_shown(command: argparse.ArgumentParser) -> None:
     """What a picture does where the scene knows little."""
+    command.add_argument("--fade", action="store_true", help="fade out what no photo saw from near this view")
     command.add_argument(
-        "--fade", action="store_true", help="leave out what no photo looked at from about there, softly"
-    )
-    command.add_argument(
-        "--fill", action="store_true", help="fill gaps by what is around them, as the window does"
+        "--fill", action="store_true", help="fill gaps from what is around them, as the window does"
     )
 
 
@@ -136,7 +141,8 @@ def add_backend(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "--backend",
         choices=("gl", "torch"),
-        help="gl: the window's renderer; torch: the slow reference (default: gl if there is OpenGL)",
+        help="what draws: gl, the window's renderer, or torch, the slow reference (default: gl if OpenGL "
+        "works)",
     )
 
 
@@ -147,7 +153,7 @@ def add_axes(command: argparse.ArgumentParser, written: bool = False) -> None:
         type=str.lower,
         choices=AXES,
         metavar="AXES",
-        help="of a .spz that does not say it: where its x, y and z point; rub: right, up, back, as the "
+        help="of a .spz that does not say: where its x, y and z point; rub: right, up, back, as the "
         "format has it (default); rdf: right, down, front, as SuperSplat and splat-transform write it;"
         " others alike" + ("; a .spz that is written gets these axes, and says so" if written else ""),
     )
@@ -155,7 +161,7 @@ def add_axes(command: argparse.ArgumentParser, written: bool = False) -> None:
 
 def add_json(command: argparse.ArgumentParser) -> None:
     """One document for programs instead of lines for people."""
-    command.add_argument("--json", action="store_true", help="one JSON document on stdout, nothing else")
+    command.add_argument("--json", action="store_true", help="print one JSON document and nothing else")
 
 
 def add_description(command: argparse.ArgumentParser) -> None:

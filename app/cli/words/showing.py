@@ -3,7 +3,7 @@
 import re
 from pathlib import Path
 
-from ..values import point, view_index, whole_count
+from ..values import photo_index, point, whole_count
 from .shared import add_backend, add_json, new_actions, new_command
 
 SHELLS = ("bash", "zsh", "fish")
@@ -14,42 +14,49 @@ def add_tour(commands) -> None:
     actions = new_actions(
         commands, "tour", "make a guided tour of a scene: named views, pinned notes and measures"
     )
-    listing = _action(actions, "list", "its stops, in order, and its notes")
+    listing = _action(actions, "list", "list stops in order, and notes")
     add_json(listing)
     _add_stop(actions)
     _add_note(actions)
-    removing = _changing(actions, "remove", "take stops and notes away")
-    removing.add_argument("stops", nargs="*", metavar="STOP", help="names, or numbers from 1")
+    removing = _changing(actions, "remove", "remove stops and notes")
+    removing.add_argument("stops", nargs="*", metavar="STOP", help="their names, or numbers from 1")
     removing.add_argument(
-        "--note", nargs="+", type=whole_count, default=[], metavar="N", help="numbers, as `list` has them"
+        "--note", nargs="+", type=whole_count, default=[], metavar="N", help="numbers, as `list` shows them"
     )
-    order = _changing(actions, "order", "the stops in another order")
+    order = _changing(actions, "order", "change the order of the stops")
     order.add_argument("stops", nargs="+", metavar="STOP", help="those that come first; the others follow")
-    start = _changing(actions, "start", "where the scene opens")
+    start = _changing(actions, "start", "choose where the scene opens")
     start.add_argument("stop", nargs="?", metavar="STOP", help="(default: where it opens without a tour)")
     out = _action(actions, "export", "the tour as JSON")
     out.add_argument("-o", "--output", required=True, type=Path, metavar="FILE", help="the .json to write")
     into = _changing(actions, "import", "a tour from JSON, instead of the scene's own")
-    into.add_argument("file", type=Path, metavar="FILE", help="as `langflash tour export` writes it")
-    into.add_argument("--add", action="store_true", help="behind the scene's own stops and notes")
+    into.add_argument("file", type=Path, metavar="FILE", help="a file written by `langflash tour export`")
+    into.add_argument("--add", action="store_true", help="add it after the scene's own stops and notes")
 
 
 def _add_stop(actions) -> None:
-    command = _changing(actions, "stop", "one more stop")
+    command = _changing(actions, "stop", "add a stop")
     command.add_argument("name", metavar="NAME")
     seen = command.add_mutually_exclusive_group()
-    seen.add_argument("--view", type=view_index, metavar="N", help="as a photo saw it, from 0 (default: 0)")
-    seen.add_argument("--camera", type=Path, metavar="FILE", help="as of `langflash render --camera`")
-    command.add_argument("--text", default="", metavar="TEXT", help="what is told there")
-    command.add_argument("--phrase", default="", metavar="PHRASE", help="what is asked there")
-    command.add_argument(
-        "--place", type=whole_count, metavar="N", help="in the order, from 1 (default: last)"
+    seen.add_argument(
+        "--view", type=photo_index, metavar="N", help="look from this photo, counted from 1 (default: 1)"
     )
-    command.add_argument("--start", action="store_true", help="the scene opens there")
+    seen.add_argument(
+        "--camera",
+        type=Path,
+        metavar="FILE",
+        help="look from this camera, as for `langflash render --camera`",
+    )
+    command.add_argument("--text", default="", metavar="TEXT", help="the text shown there")
+    command.add_argument("--phrase", default="", metavar="PHRASE", help="the phrase asked there")
+    command.add_argument(
+        "--place", type=whole_count, metavar="N", help="its number among the stops, from 1 (default: last)"
+    )
+    command.add_argument("--start", action="store_true", help="the scene opens at this stop")
 
 
 def _add_note(actions) -> None:
-    command = _changing(actions, "note", "words pinned to a point, or to what a phrase finds, or a measure")
+    command = _changing(actions, "note", "pin a note to a point or to what a phrase finds, or add a measure")
     command.add_argument("text", nargs="?", default="", metavar="TEXT", help="(default: the phrase)")
     command.add_argument(
         "--at",
@@ -58,9 +65,9 @@ def _add_note(actions) -> None:
         help="in scene units (default: the middle of what --phrase finds)",
     )
     command._negative_number_matcher = re.compile(r"^-[\d.]")  # a point may begin with a minus
-    command.add_argument("--to", type=point, metavar="X,Y,Z", help="measures the length from --at to there")
+    command.add_argument("--to", type=point, metavar="X,Y,Z", help="measure the length from --at to here")
     command.add_argument(
-        "--phrase", default="", metavar="PHRASE", help="what is asked by who chooses the note"
+        "--phrase", default="", metavar="PHRASE", help="the phrase asked when the note is chosen"
     )
     add_backend(command)
 
@@ -74,7 +81,7 @@ def _action(actions, name: str, purpose: str):
 def _changing(actions, name: str, purpose: str):
     command = _action(actions, name, purpose)
     command.add_argument(
-        "-o", "--output", type=Path, metavar="SCENE", help="write there (default: into the scene itself)"
+        "-o", "--output", type=Path, metavar="SCENE", help="write here (default: into the scene itself)"
     )
     return command
 
@@ -84,7 +91,7 @@ def add_completion(commands) -> None:
     command = new_command(
         commands,
         "completion",
-        "print what makes a shell complete commands, options and their words",
+        "print a script that lets a shell complete commands and options",
         epilog='bash: eval "$(langflash completion bash)"; zsh: the same with zsh; '
         "fish: langflash completion fish | source",
     )
@@ -94,8 +101,8 @@ def add_completion(commands) -> None:
 def add_desktop(commands) -> None:
     """`langflash desktop`."""
     command = new_command(
-        commands, "desktop", "add an entry to the menu, and open .langflash files by a click (Linux)"
+        commands, "desktop", "add a menu entry, and open .langflash files with a click (Linux)"
     )
     way = command.add_mutually_exclusive_group(required=True)
-    way.add_argument("--install", action="store_true", help="for this user, in the XDG folders")
-    way.add_argument("--remove", action="store_true", help="take away what --install wrote")
+    way.add_argument("--install", action="store_true", help="install for this user, in the XDG folders")
+    way.add_argument("--remove", action="store_true", help="remove what --install wrote")

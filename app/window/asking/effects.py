@@ -89,7 +89,7 @@ class AskingEffects(Effects):
             return
         command = at_point(state, read[0].point)
         if command is None:
-            text = "Nothing of the answer is there; click on a part of it, with Ctrl held."
+            text = "There is no part of the answer there; Ctrl+click one of its parts."
             self._hands.perform(Notify(text, "info"))
         else:
             self._hands.perform(command)

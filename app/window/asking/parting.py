@@ -18,7 +18,7 @@ from ..state import State
 from .commands import lapsed
 from .state import Part, Parts, Prompt, plain
 
-TAKING_OUT = "Taking a part out"
+TAKING_OUT = "Removing a part"
 """Title of the job."""
 NEAR = 0.03
 """Of the distance that one looks from: how near to a part a click must be."""
@@ -47,7 +47,7 @@ class TakePartOut:
         k = own_atom(state, self.part)
         if k is not None:  # it was taken out and back before
             return denied(state, k, self.text)
-        return state.with_scene(job=Job(TAKING_OUT, "taking it out", started=state.now))
+        return state.with_scene(job=Job(TAKING_OUT, "removing it", started=state.now))
 
 
 @dataclass(frozen=True)
@@ -61,9 +61,7 @@ class TakePartBack:
         marks = state.editing.marks
         if marks is None or self.atom >= len(marks.atoms):
             return state
-        after = with_edit(
-            state, f"Take a part back into {self.text}", allow_atom(marks, self.atom, self.text)
-        )
+        after = with_edit(state, f"Put a part back into {self.text}", allow_atom(marks, self.atom, self.text))
         return lapsed(after)
 
 
@@ -75,7 +73,7 @@ class TakePartAt:
 
     def apply(self, state: State) -> State:
         if divided(state) is None:
-            text = "Ask for something first; a click with Ctrl then takes a part out of its answer."
+            text = "Ask for something first; Ctrl+click then removes a part of its answer."
             return Notify(text, "info").apply(state)
         return state
 
@@ -90,7 +88,7 @@ def denied(state: State, k: int, text: str) -> State:
     """The state in which an atom is not what the text means."""
     marks = state.editing.marks
     assert marks is not None
-    return lapsed(with_edit(state, f"Take a part out of {text}", deny_atom(marks, k, text)))
+    return lapsed(with_edit(state, f"Remove a part of {text}", deny_atom(marks, k, text)))
 
 
 def own_atom(state: State, part: Part) -> int | None:

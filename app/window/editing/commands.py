@@ -14,7 +14,7 @@ from ..commands import Notify
 from ..state import State
 from .state import Floaters, Point, Region
 
-FELL_OFF = "The oldest edits can no longer be undone: the list holds the last 1,000, or 32 MB of them."
+FELL_OFF = "The oldest edits can no longer be undone: the list keeps the last 1,000, or 32 MB of them."
 
 
 def with_edit(state: State, label: str, marks: Marks) -> State:

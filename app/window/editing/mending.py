@@ -90,7 +90,7 @@ class HiddenForGood:
     def apply(self, state: State) -> State:
         if self.fits(state):
             return state
-        text = "Nothing was hidden, since the scene was edited meanwhile; hide it again."
+        text = "Nothing was hidden, since the scene was edited in the meantime; hide it again."
         return Notify(text).apply(state.with_scene(job=None))
 
     def arrival(self, state: State) -> SceneArrived:

@@ -474,7 +474,7 @@ class KeepLessons(EditErrand):
 
         record = spoken_scene(self.scene, self.marks).record
         if not record.atom_names and not record.atom_denials:
-            yield Notify("Name a group first; what you name is then known in other scenes, too.", "info")
+            yield Notify("Name a group first; then the name can be used in other scenes too.", "info")
             return
         looks = appearances(self.scene)
         lessons = lessons_of(record, looks.rows, looks.network)
@@ -495,7 +495,7 @@ class FindLessons(EditErrand):
 
         try:
             if not self.path.exists():
-                yield Notify("Nothing is kept yet: name a group, and keep it for other scenes.", "info")
+                yield Notify("Nothing is saved yet; name a group and keep the name for other scenes.", "info")
                 return
             record = spoken_scene(self.scene, self.marks).record
             found = taken(replace(self.scene, record=record), read_lessons(self.path))

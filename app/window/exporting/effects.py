@@ -26,7 +26,7 @@ from .commands import (
     ShowExport,
     TargetLookedUp,
 )
-from .order import Order, look_up, order, pixels, source, there
+from .order import Order, look_up, order, pixels, shape, source, there
 from .process import Exporter, camera_json, keys_json
 
 
@@ -87,7 +87,7 @@ class ExportingEffects(Effects):
     def _export(self, state: State, sure: bool) -> None:
         perform = self._hands.perform
         if self._exporter.running:
-            perform(Notify("An export is under way; wait for it, or stop it."))
+            perform(Notify("An export is running; wait for it, or stop it."))
             return
         state = TargetLookedUp(look_up(state)).apply(state)
         wanted = order(state)
@@ -118,7 +118,7 @@ class ExportingEffects(Effects):
         """
         make_folder(wanted.target.parent)
         if wanted.camera_file is not None:
-            size = pixels(state.exporting.form.side, state.scene.pose.aspect)
+            size = pixels(state.exporting.form.side, shape(state))
             keys = state.keys if state.exporting.form.what.moves else ()
             content = keys_json(keys, *size) if keys else camera_json(state.scene.pose, *size)
             write_atomically(wanted.camera_file, content)

@@ -65,7 +65,7 @@ def order(state: State) -> Order | str:
         threshold=_threshold(state) if phrases else None,
         fade=fades(state),
         fill=what.fills and fills_gaps(state) and (what.phrases == "one" or not phrases),
-        size=pixels(form.side, state.scene.pose.aspect) if what.sized else None,
+        size=pixels(form.side, shape(state)) if what.sized else None,
         **_seen_from(state, camera_file),
         **(_colours(state) if what.colours else {}),
     )
@@ -86,7 +86,7 @@ def _target(state: State) -> Path | str:
     if there.scene:
         return "This file is the scene itself; choose another name."
     if there.photo:
-        return "This would replace a photo of the tray; choose another name."
+        return "This would replace one of your photos; choose another name."
     return target
 
 
@@ -147,8 +147,18 @@ def _camera_file(state: State, target: Path) -> Path | None:
     form = state.exporting.form
     if form.what.moves:
         return target.with_name(f"{target.stem}.keys.json") if way(state) == "keys" else None
-    looks = form.what.looks and not form.all_views and state.scene.view is None
-    return target.with_name(f"{target.stem}.camera.json") if looks else None
+    return target.with_name(f"{target.stem}.camera.json") if _on_show(form) else None
+
+
+def _on_show(form: ExportForm) -> bool:
+    """Whether what the window shows is to be written, not what photos show."""
+    return form.what.looks and not form.all_views
+
+
+def shape(state: State) -> float:
+    """Width over height of what is written: of the view on show as the window shows it, else of a photo."""
+    width, height = state.stats.picture_size
+    return width / height if _on_show(state.exporting.form) and width and height else state.scene.pose.aspect
 
 
 def _seen_from(state: State, camera_file: Path | None) -> dict[str, Any]:
@@ -160,7 +170,7 @@ def _seen_from(state: State, camera_file: Path | None) -> dict[str, Any]:
         return {}
     if form.all_views:
         return {"all_views": form.what is not SEGMENTED}
-    return {"view": state.scene.view, "camera": camera_file}
+    return {"camera": camera_file}
 
 
 def _real(*files: Path | None) -> set[str]:
@@ -207,7 +217,7 @@ def _phrases(state: State) -> tuple[tuple[str, ...], str]:
         return asked, ""
     wanted = what.needs_phrases or (what.takes_phrases and state.exporting.form.only_found)
     if wanted and not asked:
-        return (), "There is no phrase to keep only the answers of; type one under Find first."
+        return (), "There is no phrase to export the answers of; type one under Find first."
     return (asked if wanted else ()), ""
 
 
@@ -228,11 +238,11 @@ def remarks(state: State) -> list[str]:
     if state.scene.info is not None and source(state) != state.scene.info.path:
         unsaved = "edits are" if state.editing.exported_anew else "scene is"
         why = "selection is" if form.only_selected and form.what.splats else unsaved
-        notes.append(f"The {why} not saved: the command reads a copy that goes when the window closes.")
+        notes.append(f"The {why} not saved: the command reads a copy that is deleted when the window closes.")
     if not (form.what.needs_phrases or form.only_found):
         return notes
     if form.what.phrases != "one" and len({prompt.threshold for prompt in state.asking.asked}) > 1:
         notes.append("The thresholds differ, so the calibrated one is used for all.")
     if state.asking.negatives:
-        notes.append("Phrases are compared with the usual ones, not with your own.")
+        notes.append("The export compares phrases with the default ones, not with your own.")
     return notes

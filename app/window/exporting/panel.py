@@ -34,26 +34,27 @@ def draw(state: State, look: Look) -> list[do.Command]:
     flags = imgui.ChildFlags_.auto_resize_y | imgui.ChildFlags_.nav_flattened  # keys walk in and out
     imgui.set_next_window_size_constraints(ImVec2(0, 0), ImVec2(math.inf, room))
     imgui.begin_child("##form", ImVec2(0, 0), flags)
-    issued = _form(state, look)
+    issued, confirmed = _form(state, look)
     imgui.end_child()
-    return issued + _buttons(state, look)
+    return issued + _buttons(state, look, confirmed)
 
 
-def _form(state: State, look: Look) -> list[do.Command]:
-    """What is wanted, and the command that it is."""
+def _form(state: State, look: Look) -> tuple[list[do.Command], bool]:
+    """What is wanted, and the command that it is; the second value tells whether Enter has ended its path."""
     form = state.exporting.form
     wanted = _kinds(form, look)
     widgets.muted(form.what.tip)
     widgets.gap(look.px(4))
     wanted = _options(state, wanted, look)
     widgets.gap(look.px(4))
-    imgui.text("Where to write it")
+    imgui.text("Save as")
     imgui.set_next_item_width(-widgets.folder_room())
     _, path = imgui.input_text("##file", wanted.path)
+    confirmed = widgets.confirmed()
     elsewhere: list[do.Command] = [opening.LookForPlace()] if widgets.folder_button() else []
     wanted = replace(wanted, path=path)
     issued: list[do.Command] = [] if wanted == form else [export.EditForm(wanted)]
-    return issued + elsewhere + _order(state, look)
+    return issued + elsewhere + _order(state, look), confirmed
 
 
 def _kinds(form: ExportForm, look: Look) -> ExportForm:
@@ -76,7 +77,7 @@ def _options(state: State, form: ExportForm, look: Look) -> ExportForm:
     if what.looks:
         _label("Seen from", look)
         count = len(state.scene.info.views) if state.scene.info else 0
-        options = (("the view on show", False), (f"all {count} photos' views", True))
+        options = (("this view", False), (f"all {count} photos", True))
         form = replace(form, all_views=widgets.choice(options, form.all_views))
     if what.sized:
         _label("Longer side", look)
@@ -97,7 +98,7 @@ def _options(state: State, form: ExportForm, look: Look) -> ExportForm:
         if changed:
             form = replace(form, seconds=float(round(seconds)))
     if what.fades and photos_known(state):
-        changed, fade = widgets.checkbox("Fade what no photo looked at", written.fades(state))
+        changed, fade = widgets.checkbox("Fade what no photo saw", written.fades(state))
         if changed:
             form = replace(form, fade=fade)
     return _narrowed(state, form, look)
@@ -134,7 +135,7 @@ def _order(state: State, look: Look) -> list[do.Command]:
     if isinstance(order, str):
         widgets.muted(order)
         return []
-    widgets.muted("The same on the command line:")
+    widgets.muted("As a command:")
     _command_line(order.line, look)
     issued = _copy(order.line)
     for remark in written.remarks(state):
@@ -143,12 +144,12 @@ def _order(state: State, look: Look) -> list[do.Command]:
     return issued
 
 
-def _buttons(state: State, look: Look) -> list[do.Command]:
+def _buttons(state: State, look: Look, confirmed: bool) -> list[do.Command]:
     """What runs it, and what closes the dialog."""
     issued: list[do.Command] = []
     busy = state.exporting.running is not None
     imgui.begin_disabled(isinstance(written.order(state), str) or busy)
-    if widgets.primary_button("Export", look.vec(120, 0)):
+    if widgets.default_button("Export", look.vec(120, 0), confirmed):
         issued.append(export.Export())
     imgui.end_disabled()
     imgui.same_line()
@@ -156,7 +157,7 @@ def _buttons(state: State, look: Look) -> list[do.Command]:
         issued.append(do.ShowDialog(None))
     if busy:
         imgui.same_line()
-        imgui.text_colored(theme.MUTED, "one is under way")
+        imgui.text_colored(theme.MUTED, "an export is running")
     return issued
 
 
@@ -164,14 +165,14 @@ def draw_replacing(state: State, look: Look) -> list[do.Command]:
     """The question before files are written over."""
     there = state.exporting.there
     alone = len(there) == 1
-    imgui.text_wrapped("This file is there already:" if alone else "These files are there already:")
+    imgui.text_wrapped("This file already exists:" if alone else "These files already exist:")
     for file in there[:_NAMED]:
         widgets.muted(str(file))
     if len(there) > _NAMED:
         widgets.muted(f"and {len(there) - _NAMED} more")
     widgets.gap(look.px(4))
     issued: list[do.Command] = []
-    if widgets.primary_button("Replace it" if alone else "Replace them", look.vec(140, 0)):
+    if widgets.default_button("Replace it" if alone else "Replace them", look.vec(140, 0)):
         issued.append(export.Export(sure=True))
     imgui.same_line()
     if imgui.button("Choose another name", look.vec(190, 0)):

@@ -44,7 +44,7 @@ class ClearKeys:
     """No key frames."""
 
     def apply(self, state: State) -> State:
-        return _with_keys(state, "Forget the key frames", ()).with_filming(tour=None)
+        return _with_keys(state, "Remove all key frames", ()).with_filming(tour=None)
 
 
 @dataclass(frozen=True)
@@ -53,7 +53,7 @@ class Preview:
 
     def apply(self, state: State) -> State:
         if len(state.keys) < 2:
-            text = "A camera path needs two key frames or more; fly somewhere and add one (M)."
+            text = "A camera path needs two or more key frames; fly somewhere and add one (M)."
             return Notify(text, "info").apply(state)
         return state
 

@@ -49,12 +49,12 @@ def _bar(state: State, look: Look) -> list[do.Command]:
     if imgui.button(f"{fa.ICON_FA_STOP if playing else fa.ICON_FA_PLAY}##tour"):
         issued.append(film.StopTour() if playing else film.Preview())
     imgui.end_disabled()
-    widgets.tooltip("Fly along the key frames, as a film does  (J)")
+    widgets.tooltip("Fly along the key frames  (J)")
     for place in range(min(count, _MOST_SHOWN)):
         imgui.same_line()
         if imgui.button(f"{place + 1}##key"):
             issued.append(camera.FlyTo(state.keys[place]))
-        widgets.tooltip("Fly there; with the right button remove it")
+        widgets.tooltip("Fly there; right-click removes it")
         if imgui.is_item_clicked(imgui.MouseButton_.right):
             issued.append(film.RemoveKey(place))
     if count > _MOST_SHOWN:
@@ -63,9 +63,9 @@ def _bar(state: State, look: Look) -> list[do.Command]:
     imgui.same_line()
     if imgui.button(f"{fa.ICON_FA_PLUS}##key"):
         issued.append(film.AddKey())
-    widgets.tooltip("The present view as a key frame  (M)")
+    widgets.tooltip("Add this view as a key frame  (M)")
     imgui.same_line()
-    if widgets.quiet_button(f"{fa.ICON_FA_TRASH}##keys", "Forget the key frames"):
+    if widgets.quiet_button(f"{fa.ICON_FA_TRASH}##keys", "Remove all key frames"):
         issued.append(film.ClearKeys())
     imgui.pop_style_var()
     return issued

@@ -42,12 +42,14 @@ GESTURES = (
     ("Middle drag, Shift + left drag", "pan"),
     ("Wheel", "zoom"),
     ("Right drag", "look around"),
-    ("W A S D, Q E", "fly, down and up; Shift is faster"),
-    ("Shift, Ctrl while selecting", "add, remove;  Alt: orbit"),
-    ("Enter, Up, Down in a phrase", "the next one, recent ones"),
-    ("Tab, F6", "the next control, the next area"),
+    ("W A S D, Q E", "fly; down, up; faster with Shift"),
+    ("Shift, Ctrl while selecting", "add, subtract;  Alt: orbit"),
+    ("Enter, Up, Down in a phrase", "next phrase, recent phrases"),
+    ("Tab, F6", "next control, next area"),
     ("Esc", "one step back; cancels a job"),
 )
+_ARROWS = ("Left", "Right", "Up", "Down")
+_POINTING = 6  # commands of a family whose keys point where they go
 COLUMNS = ((None, "View", "Program"), ("File", "Find", "Tools", "Edit"))  # of help; None: the gestures
 _CLOSING = (
     do.ShowDialog | show.SaveScene | show.OpenPaths | show.Instead | show.All | show.GoOn | show.SaveFirst
@@ -117,12 +119,12 @@ def _body(dialog: Dialog) -> Callable[[State, Look], list[do.Command]]:
         Dialog.PLACE: browser.draw,
         Dialog.FILM: strip.draw,
         Dialog.UNSAVED: rooms.draw_unsaved,
-        Dialog.SAVE_PROMPTS: _saving("Where to write them", ask.SavePrompts),
+        Dialog.SAVE_PROMPTS: _saving("Save as", ask.SavePrompts),
         Dialog.LOAD_PROMPTS: _loading(
-            "A set of phrases (.prompts.json); they replace the present ones", ask.LoadPrompts
+            "A set of phrases (.prompts.json); it replaces the current ones", ask.LoadPrompts
         ),
-        Dialog.SAVE_RECIPE: _saving("Where to write what is cleaned up", clean.SaveRecipe),
-        Dialog.LOAD_RECIPE: _loading("A recipe (.json); it replaces the present rules", clean.LoadRecipe),
+        Dialog.SAVE_RECIPE: _saving("Save as", clean.SaveRecipe),
+        Dialog.LOAD_RECIPE: _loading("A recipe (.json); it replaces the current rules", clean.LoadRecipe),
         Dialog.EXPORT: export_panel.draw,
         Dialog.REPLACE: export_panel.draw_replacing,
         Dialog.SETTINGS: recovery_panels.draw_settings,
@@ -132,14 +134,14 @@ def _body(dialog: Dialog) -> Callable[[State, Look], list[do.Command]]:
 
 
 def _save(state: State, look: Look) -> list[do.Command]:
-    issued, confirmed = _path_field(state, "Where to write it", place=True)
+    issued, confirmed = _path_field(state, "Save as", place=True)
     path, exists = typed_scene(state.typed), state.typed.there is There.FILE
-    consequence = f"{path} will be replaced." if exists else f"Writes {path}"
+    consequence = f"{path} will be replaced." if exists else f"Saves {path}"
     widgets.muted("Type a file name." if path is None else consequence)
     imgui.begin_disabled(path is None)
-    pressed = widgets.primary_button("Replace" if exists else "Save", look.vec(120, 0))
+    pressed = widgets.default_button("Replace" if exists else "Save", look.vec(120, 0), confirmed)
     imgui.end_disabled()
-    if path is not None and (pressed or confirmed):
+    if path is not None and pressed:
         issued.append(show.SaveScene(path))
     return issued
 
@@ -165,9 +167,9 @@ def _file(
     issued, confirmed = _path_field(state, label)
     text = state.typed.text.strip()
     imgui.begin_disabled(not text)
-    pressed = widgets.primary_button(verb, look.vec(120, 0))
+    pressed = widgets.default_button(verb, look.vec(120, 0), confirmed)
     imgui.end_disabled()
-    if text and (pressed or confirmed):
+    if text and pressed:
         issued.append(make(typed_path(text)))
     return issued
 
@@ -180,7 +182,7 @@ def _path_field(state: State, label: str, place: bool = False) -> tuple[list[do.
     if imgui.is_window_appearing():
         imgui.set_keyboard_focus_here()
     changed, path = imgui.input_text("##path", state.typed.text)
-    confirmed = imgui.is_item_deactivated() and imgui.is_key_pressed(imgui.Key.enter)
+    confirmed = widgets.confirmed()
     issued: list[do.Command] = [do.EditDialogPath(path)] if changed else []
     if place and widgets.folder_button():
         issued.append(opening.LookForPlace())
@@ -223,7 +225,7 @@ def _scroll_by_keys() -> None:
 
 
 def help_rows(group: str | None) -> list[tuple[str, str]]:
-    """Keys and what they do; a run of commands that are called alike up to a colon is one row."""
+    """Keys and what they do; commands in a row that are called alike up to a colon share a row."""
     if group is None:
         return list(GESTURES)
     rows = []
@@ -231,17 +233,37 @@ def help_rows(group: str | None) -> list[tuple[str, str]]:
     for family, alike in groupby(keyed, lambda each: each.name.partition(": ")[0]):
         first, *others = alike
         if others:
-            meaning = first.name + others[-1].name.replace(f"{family}: ", " to ")
-            ends = zip(first.keys, others[-1].keys, strict=False)
-            rows += [(f"{start} to {end}", meaning) for start, end in ends]
+            meaning = _meaning(family, [entry.name for entry in (first, *others)])
+            rows += [
+                (_together(keys), meaning) for keys in zip(*(e.keys for e in (first, *others)), strict=True)
+            ]
         else:
             rows.append((", ".join(map(str, first.keys)), first.name))
     return rows
 
 
+def _meaning(family: str, names: list[str]) -> str:
+    """Of two commands both, of what keys point to the family alone, of many the ends."""
+    ways = [name.removeprefix(f"{family}: ") for name in names]
+    if len(ways) == 2:
+        return f"{family}: {ways[0]}, {ways[1]}"
+    return f"{family}: {ways[0]} to {ways[-1]}" if len(ways) > _POINTING else family
+
+
+def _together(keys: tuple[table.Chord, ...]) -> str:
+    """Keys in one breath: what is held once, four arrows as that, digits by their ends."""
+    signs = [str(key) for key in keys]
+    if all(sign.isdigit() for sign in signs):
+        return f"{signs[0]} to {signs[-1]}"
+    held = signs[0][: signs[0].rfind("+") + 1] if "+" in signs[0] else signs[0][: signs[0].find(" ") + 1]
+    signs = [sign.removeprefix(held) for sign in signs]
+    arrows = [*_ARROWS] == signs[: len(_ARROWS)]
+    return held + ", ".join(["arrows", *signs[len(_ARROWS) :]] if arrows else signs)
+
+
 def _help_group(group: str | None, look: Look, room: float) -> None:
     """`room` wide, pixels; what does not fit goes on below."""
-    imgui.text_colored(theme.ACCENT, group or "Mouse and hands")
+    imgui.text_colored(theme.ACCENT, group or "Mouse")
     imgui.push_text_wrap_pos(imgui.get_cursor_pos_x() + room)
     for keys, meaning in help_rows(group):
         imgui.text(keys)
@@ -255,13 +277,13 @@ def _help_group(group: str | None, look: Look, room: float) -> None:
 def _leave(state: State, look: Look) -> list[do.Command]:
     imgui.text_wrapped("The scene is not saved.")
     issued: list[do.Command] = []
-    if widgets.primary_button("Save first", look.vec(120, 0)):
-        issued.append(do.ShowDialog(Dialog.SAVE))
-    widgets.beside(look.px(120))
-    if imgui.button("Leave", look.vec(120, 0)):
+    if widgets.default_button("Save and quit", look.vec(140, 0)):
+        issued.append(show.SaveFirst())
+    widgets.beside(look.px(180))
+    if imgui.button("Quit without saving", look.vec(180, 0)):
         issued.append(do.Leave(sure=True))
-    widgets.beside(look.px(120))
-    if imgui.button("Stay", look.vec(120, 0)):
+    widgets.beside(look.px(110))
+    if imgui.button("Cancel", look.vec(110, 0)):
         issued.append(do.ShowDialog(None))
     return issued
 
@@ -278,7 +300,7 @@ def _log(state: State, look: Look) -> list[do.Command]:
             imgui.text_unformatted(line.text)
             imgui.pop_text_wrap_pos()
     if not state.lines:
-        widgets.muted("Nothing has been said yet.")
+        widgets.muted("No messages yet.")
     if imgui.is_window_appearing():
         imgui.set_scroll_here_y(1.0)
     imgui.end_child()

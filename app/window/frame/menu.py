@@ -32,7 +32,7 @@ def _items(state: State) -> list[do.Command]:
     imgui.separator()
     issued += _named(state, "All commands", "Preferences", "Log", "Mouse and keys")
     imgui.separator()
-    issued += _named(state, "Leave")
+    issued += _named(state, "Quit")
     imgui.end_popup()
     return issued
 

@@ -33,9 +33,8 @@ def _field(text: str) -> tuple[str, int, bool]:
     if imgui.is_window_appearing():
         imgui.set_keyboard_focus_here()
     imgui.set_next_item_width(-1)
-    _, text = imgui.input_text_with_hint("##command", "what to do", text, _FLAGS, lambda _: 0)
-    enter = imgui.is_key_pressed(imgui.Key.enter) or imgui.is_key_pressed(imgui.Key.keypad_enter)
-    entered = imgui.is_item_deactivated() and enter
+    _, text = imgui.input_text_with_hint("##command", "type a command", text, _FLAGS, lambda _: 0)
+    entered = widgets.confirmed()
     down, up = (imgui.is_key_pressed(key) for key in (imgui.Key.down_arrow, imgui.Key.up_arrow))
     return text, int(down) - int(up), entered
 
@@ -61,7 +60,7 @@ def _list(
             widgets.at_right_edge(", ".join(map(str, entry.keys)))
         imgui.end_disabled()
     if not found:
-        widgets.muted("No command has these words; try one of them.")
+        widgets.muted("No matching command.")
     imgui.end_child()
     return issued
 

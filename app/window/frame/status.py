@@ -40,17 +40,17 @@ def figures(state: State) -> list[str]:
         said.insert(0, f"{state.scene.job.title}: {in_words(state.scene.job.stage)}")
     aside = degrees_from_photos(state)
     if flown_past(state):
-        said.insert(0, "the scene lies behind you: H flies back")
+        said.insert(0, "the scene is behind you: press H to go back")
     elif aside > FADING:
-        said.append(f"{aside:.0f} degrees aside of the photos: less is known here")
+        said.append(f"{aside:.0f}° away from the nearest photo: expect holes")
     if state.scene.info is not None:
         width, height = stats.picture_size
         marks = state.editing.marks
         there = marks.there if marks else (state.scene.info.num_gaussians, state.scene.info.num_atoms)
         if stats.failing:
-            said.append("a finer picture could not be drawn (F2: why); it is tried again")
+            said.append("refining failed (F2 says why); trying again")
         elif stats.settling:
-            said.append("a finer picture is being drawn")
+            said.append("refining ...")
         said += [
             f"picture {1000 * stats.picture_seconds:.0f} ms at {width} x {height}",
             _count(there[0], state.editing.num_deleted),

@@ -149,17 +149,15 @@ def _files() -> Iterable[Entry]:
     yield Entry("Merge a scene into this one ...", group, merging, _ctrl("m"), fa.ICON_FA_OBJECT_GROUP)
     reconstruct = show.Instead((show.Reconstruct(),))
     yield Entry("Reconstruct the photos", group, lambda s: reconstruct if s.scene.photos else None)
-    yield Entry("Back to the room before", group, _room_before)
+    yield Entry("Back to the previous room", group, _room_before)
     yield Entry("Pause the reconstruction", group, _pause)
     yield Entry("Cancel the reconstruction", group, lambda s: show.CancelJob() if s.scene.job else None)
-    yield Entry("Keep the two photos that make the best scene together", group, _pair)
-    yield Entry("Put photos back that were taken out", group, _photos_back)
+    yield Entry("Keep only the two best photos", group, _pair)
+    yield Entry("Put back the photos that were removed", group, _photos_back)
     yield Entry(
         "Clear the tray", group, lambda s: show.ClearPhotos() if s.scene.photos and not s.scene.job else None
     )
-    yield Entry(
-        "Leave", group, _always(do.Leave()), _ctrl("q"), fa.ICON_FA_RIGHT_FROM_BRACKET, in_fields=True
-    )
+    yield Entry("Quit", group, _always(do.Leave()), _ctrl("q"), fa.ICON_FA_RIGHT_FROM_BRACKET, in_fields=True)
 
 
 def _frames(state: State) -> do.Command | None:
@@ -203,7 +201,7 @@ def _asking() -> Iterable[Entry]:
     yield Entry(
         "Add a phrase", group, lambda s: ask.AddPrompt() if len(s.asking.prompts) < MOST_PROMPTS else None
     )
-    yield Entry("Select what the phrase means", group, _meant)
+    yield Entry("Select what the phrase found", group, _meant)
     yield Entry("Save the phrases ...", group, _always(do.ShowDialog(Dialog.SAVE_PROMPTS)))
     yield Entry("Load phrases ...", group, _always(do.ShowDialog(Dialog.LOAD_PROMPTS)))
     yield Entry("Dictionary", group, _dictionary)
@@ -235,8 +233,8 @@ def _looking() -> Iterable[Entry]:
     yield Entry("Compare with the photo", group, _compare, _plain("p"))
     yield Entry("Show the photos' cameras", group, _cameras, _plain("k"))
     yield Entry("Names of things in the picture", group, _names, _plain("n"))
-    yield Entry("Keep to what the photos saw", group, _near_photos)
-    yield Entry("Fill gaps by what is around them", group, _fill_gaps)
+    yield Entry("Stay near the photos", group, _near_photos)
+    yield Entry("Fill gaps from what is around them", group, _fill_gaps)
     yield Entry("Grid on the floor", group, _floor_grid)
     for side, forward in camera.SIDES:
         keys = _plain(_SIDE_KEYS[side]) if side in _SIDE_KEYS else ()
@@ -244,7 +242,7 @@ def _looking() -> Iterable[Entry]:
     for way, pad, yaw, pitch in (("left", 4, -1, 0), ("right", 6, 1, 0), ("up", 8, 0, -1), ("down", 2, 0, 1)):
         keys = (*_plain(f"keypad{pad}"), *_ctrl(f"{way}_arrow", shift=True))
         turn = camera.Orbit(ORBIT_STEP * yaw, ORBIT_STEP * pitch)
-        yield Entry(f"Orbit: a step {way}", group, _shown(turn), keys, repeats=True)
+        yield Entry(f"Orbit: {way}", group, _shown(turn), keys, repeats=True)
     rays = (*_plain("comma"), *_plain("keypad5"))
     yield Entry("Parallel rays (orthographic), or perspective", group, _shown(camera.SwitchRays()), rays)
     yield Entry("Add a key frame", group, _shown(film.AddKey()), _plain("m"))
@@ -254,7 +252,7 @@ def _looking() -> Iterable[Entry]:
         "Inventory: what is in the room", group, _inventory, _ctrl("l"), fa.ICON_FA_LIST_CHECK, in_fields=True
     )
     yield Entry("Tour: stops and notes", group, _tour, icon=fa.ICON_FA_SIGNS_POST)
-    yield Entry("Tour: the present view is a stop", group, _shown(tour.AddStop()))
+    yield Entry("Tour: add this view as a stop", group, _shown(tour.AddStop()))
     yield Entry("Tour: play", group, lambda s: tour.Play() if s.tour.stops else None)
     yield Entry(
         "Tour: next stop", group, lambda s: tour.Step(1) if s.tour.stops else None, _plain("page_down")
@@ -350,7 +348,7 @@ def _editing() -> Iterable[Entry]:
     yield Entry("Grow the selection", group, _selected(edit.Grow()), _plain("g"))
     deleting = (*_plain("delete"), *_plain("backspace"))
     yield Entry("Delete the selection", group, _selected(edit.Delete()), deleting)
-    yield Entry("Delete the selection and fill its hole", group, _selected(mending.FillSelection()))
+    yield Entry("Delete the selection and fill the hole", group, _selected(mending.FillSelection()))
     yield Entry("Copy the selection", group, _selected(mending.CopySelection()), _ctrl("j"))
     yield Entry("Hide the selection for good", group, _selected(mending.AskToHide()))
     yield Entry("Recolour the selection", group, _recolour, _ctrl("t"))
@@ -359,7 +357,7 @@ def _editing() -> Iterable[Entry]:
         ("up", "up_arrow", placing.Nudge(down=-1)), ("down", "down_arrow", placing.Nudge(down=1)),
         ("away", "page_up", placing.Nudge(ahead=1)), ("nearer", "page_down", placing.Nudge(ahead=-1)),
     ):  # fmt: skip
-        yield Entry(f"Gizmo: a step {name}", group, _placing(nudge), _ctrl(key))
+        yield Entry(f"Nudge the selection: {name}", group, _placing(nudge), _ctrl(key))
     yield Entry("Hide the selection", group, _selected(edit.Hide()))
     yield Entry("Show the selection alone", group, _selected(edit.Isolate()))
     yield Entry("Show what is hidden", group, _shown(edit.ShowAll()))

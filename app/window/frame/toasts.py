@@ -36,12 +36,12 @@ def _toast(toast: Toast, look: Look) -> list[do.Command]:
     icon = fa.ICON_FA_CIRCLE_EXCLAMATION if error else fa.ICON_FA_CHECK
     imgui.text_colored(theme.BAD if error else theme.GOOD, icon)
     imgui.same_line()
-    imgui.push_text_wrap_pos(look.px(400 - 16 - (70 if error else 40)))
+    imgui.push_text_wrap_pos(look.px(400 - 16 - (76 if error else 40)))
     imgui.text_unformatted(widgets.sentence(toast.text) if error else toast.text)
     imgui.pop_text_wrap_pos()
     right, top = look.px(400 - 16 - 30), imgui.get_style().window_padding.y - look.px(6)
     if error:
-        imgui.set_cursor_pos(ImVec2(right - look.px(32), top))
+        imgui.set_cursor_pos(ImVec2(right - look.px(38), top))
         if widgets.quiet_button(f"{fa.ICON_FA_COPY}##copy", "Copy"):
             issued.append(do.CopyText(toast.text))
     imgui.set_cursor_pos(ImVec2(right, top))

@@ -95,7 +95,7 @@ def _body(state: State, look: Look, picture: tuple[float, float, float]) -> list
         issued += _row(state, row, look, picture)
         imgui.pop_id()
     if not listing.rows:
-        widgets.muted("Nothing here is sure enough to be listed; ask for it by a phrase.")
+        widgets.muted("Nothing here is certain enough to list; search for it with a phrase.")
     imgui.end_child()
     return issued + _foot(state, look)
 
@@ -162,7 +162,7 @@ def _name(state: State, row: Row, width: float) -> list[do.Command]:
     entered, name = imgui.input_text_with_hint(
         _NAME, row.id + maybe, own, imgui.InputTextFlags_.enter_returns_true
     )
-    widgets.tooltip(f"{row.id}; type to name it")
+    widgets.tooltip(f"{row.id}; type a name")
     changed = entered or imgui.is_item_deactivated_after_edit()
     return [take.NameThing(row.id, name)] if changed and name != own else []
 
@@ -181,7 +181,7 @@ def _sure(row: Row, right: float, look: Look) -> None:
     end = ImVec2(low.x + row.sure * look.px(_BAR), full.y)
     canvas.add_rect_filled(low, end, widgets.u32(theme.GOOD if row.sure >= SURE else theme.ACCENT), high / 2)
     imgui.dummy(ImVec2(look.px(_BAR), line))
-    widgets.tooltip("How sure it is what it is called" if row.sure >= SURE else "It may be something else")
+    widgets.tooltip("How certain its name is" if row.sure >= SURE else "It may be something else")
     imgui.same_line(0, look.px(8))
     imgui.set_cursor_pos_x(right - imgui.calc_text_size(figure).x)
     imgui.text_colored(theme.MUTED, figure)
@@ -205,13 +205,13 @@ def _foot(state: State, look: Look) -> list[do.Command]:
     if listing.guess is not None:
         by = ", ".join(listing.guess.by)
         text, tip = (
-            f"Lengths are a guess, ± {listing.guess.spread:.0%}.",
-            f"By {by}. Measure one (T) and type it.",
+            f"Lengths are estimates, ± {listing.guess.spread:.0%}.",
+            f"By {by}. Measure one (T) and type its true length.",
         )
     elif listing.unit == "m":
-        text, tip = "Lengths are as you told them.", ""
+        text, tip = "Lengths use the scale that you set.", ""
     else:
-        text, tip = "Lengths are in the scene's own unit.", "Measure one (T) and type how long it is."
+        text, tip = "Lengths are in scene units.", "Measure one (T) and type its true length."
     imgui.text_colored(theme.MUTED, text)
     widgets.tooltip(tip)
     if state.world is None:

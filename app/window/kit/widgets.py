@@ -70,6 +70,29 @@ def primary_button(label: str, size: ImVec2 | None = None) -> bool:
         return imgui.button(label, size or ImVec2(0, 0))
 
 
+def default_button(label: str, size: ImVec2 | None = None, confirmed: bool = False) -> bool:
+    """The primary button of a dialog, which Enter presses too, unless the keys are on another control.
+    confirmed: Enter has ended what is typed in the field that the dialog is about."""
+    pressed = primary_button(label, size)
+    imgui.set_item_default_focus()
+    context = imgui.get_current_context()
+    if context.last_item_data.item_flags & imgui.ItemFlags_.disabled.value:
+        return False
+    elsewhere = context.io.nav_visible and context.nav_id != imgui.get_item_id()
+    taken = elsewhere or context.active_id_previous_frame != 0 or imgui.is_any_item_active()
+    return pressed or confirmed or (enters() and not taken)
+
+
+def confirmed() -> bool:
+    """Whether Enter has ended what is typed in the last item, a field."""
+    return imgui.is_item_deactivated() and enters()
+
+
+def enters() -> bool:
+    """Whether Enter, of the letters or of the numbers, went down in this frame."""
+    return any(imgui.is_key_pressed(key, False) for key in (imgui.Key.enter, imgui.Key.keypad_enter))
+
+
 def choice(options: Sequence[tuple[str, _Value]], chosen: _Value) -> _Value:
     """One of several values, a button each in a row, or in more where the window ends; returns the one that
     now holds."""

@@ -187,7 +187,7 @@ class SwitchFrame:
             return state
         chosen = set(film.chosen) ^ {self.index}
         if len(chosen) > room_for_frames(state):
-            text = f"At most {room_for_frames(state)} frames make one scene; take another one out first."
+            text = f"At most {room_for_frames(state)} frames fit into one scene; exclude another one first."
             return Notify(text).apply(state)
         return _with_film(state, replace(film, chosen=tuple(sorted(chosen))))
 

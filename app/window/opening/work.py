@@ -41,7 +41,7 @@ class LookThrough(Job):
 
         def check() -> None:
             if cancelled():
-                raise Cancelled("the film was not looked through to its end")
+                raise Cancelled("the film was not read to its end")
 
         return FilmRead(self.path, strip_of(self.path, progress=progress, check=check))
 

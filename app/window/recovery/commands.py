@@ -165,7 +165,7 @@ def restored_tray(state: State, photos: Iterable[KeptPhoto], missing: Sequence[s
     if not missing:
         return state
     others = f" and {len(missing) - 1} more" if len(missing) > 1 else ""
-    text = f"{missing[0]}{others} of the tray cannot be found any more; drop the photos again to use them."
+    text = f"{missing[0]}{others} can no longer be found; drop the photos again to use them."
     return Notify(text, "info").apply(state)
 
 

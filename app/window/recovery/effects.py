@@ -183,7 +183,7 @@ class RecoveryEffects(Effects):
                 or before.editing.history is None
                 or before.editing.history.done
             ):
-                text = f"The edits of {before.scene.info.name} are kept; go back to it to go on with them."
+                text = f"The edits of {before.scene.info.name} are kept; go back to it to continue."
                 self._hands.perform(Notify(text, "info"))
         self._edits_kept, self._edits_wrote, self._keep_edits_at = False, False, NEVER
         self._replaced = []
@@ -288,7 +288,7 @@ class RecoveryEffects(Effects):
         try:
             self._keeper.keep(kept)
         except LangFlashError as error:
-            self._hands.dispatch(Log("error", f"The session is not kept: {error}."))
+            self._hands.dispatch(Log("error", f"The session could not be saved: {error}."))
             return
         if outlived is not None:
             sessions.forget(outlived)

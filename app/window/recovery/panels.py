@@ -22,7 +22,7 @@ _EDITS_OFFER, _ANSWER, _NAME = 470.0, 108.0, 180.0  # design pixels wide; its bu
 _OFFER = 480.0  # design pixels
 _OF_TOOLS = ("##card", "##ruler", "##keys", "Rules")  # windows, beside their bars
 _DETAIL_TIP = (
-    "How fine the next scene of photos is\nnormal: some 140,000 Gaussians for two photos\n"
+    "How fine the next scene will be\nnormal: about 140,000 Gaussians from two photos\n"
     "high: 1.4 times as many, slower to draw\nlow: a third, quicker to draw"
 )
 
@@ -35,32 +35,32 @@ def draw_settings(state: State, look: Look) -> list[do.Command]:
     new = replace(new, theme=widgets.choice([(name.capitalize(), name) for name in THEMES], old.theme))
     _label("Colour map", look)
     new = replace(new, colormap=widgets.choice([(name, name) for name in COLOUR_MAPS], old.colormap))
-    _label("Detail of scenes", look)
+    _label("Detail of new scenes", look)
     imgui.begin_group()
     new = replace(new, detail=widgets.choice([(name.capitalize(), name) for name in DETAILS], old.detail))
     imgui.end_group()
     widgets.tooltip(_DETAIL_TIP)
-    _label("Size of the interface", look)
+    _label("Interface size", look)
     sizes = [(f"{scale:.0%}", scale) for scale in (0.75, 1.0, 1.25, 1.5, 2.0)]
     new = replace(new, scale=widgets.choice(sizes, old.scale))
-    _label("Speed of flying", look)
+    _label("Flying speed", look)
     width = imgui.get_content_region_avail().x
     changed, speed = widgets.slider("##speed", old.speed, SPEEDS, f"{old.speed:.1f}", "", width)
     if changed:
         new = replace(new, speed=speed)
     for text, name in (
-        ("Touch pad: two fingers turn, with Ctrl they zoom, with Shift they slide", "touch_pad"),
+        ("Touchpad: two fingers orbit; with Ctrl they zoom, with Shift they pan", "touch_pad"),
         ("Show the photos' cameras in the scene", "photos_in_space"),
-        ("Keep to what the photos saw: orbits slow down, and the rest fades", "near_photos"),
-        ("A grid on the floor, of a scene that is level", "floor_grid"),
-        ("Fill gaps by what is around them", "fill_gaps"),
+        ("Stay near the photos: orbits slow down, and the rest fades", "near_photos"),
+        ("Show a grid on the floor, once the scene is level", "floor_grid"),
+        ("Fill gaps from what is around them", "fill_gaps"),
         ("Reconstruct as soon as photos are dropped", "start_at_once"),
     ):
         changed, value = widgets.worded_checkbox(text, getattr(old, name))
         if changed:
             new = replace(new, **{name: value})
     widgets.gap(look.px(4))
-    widgets.muted(f"Kept in {preferences.file()}")
+    widgets.muted(f"Saved in {preferences.file()}")
     issued: list[do.Command] = [] if new == old else [keep.Prefer(new)]
     if imgui.button(f"{fa.ICON_FA_ROTATE_LEFT}  Defaults"):
         kept = replace(preferences.DEFAULTS, recent=old.recent, window=old.window)
@@ -86,13 +86,13 @@ def draw_offer(state: State, look: Look, place: ImVec2, size: ImVec2) -> list[do
     imgui.push_style_var(imgui.StyleVar_.window_rounding, look.px(8))
     imgui.push_style_color(imgui.Col_.window_bg, theme.POPUP)
     imgui.begin("##session", None, widgets.PLAIN | imgui.WindowFlags_.no_focus_on_appearing)
-    imgui.text_wrapped("LangFlash did not end well last time. It had open:")
+    imgui.text_wrapped("LangFlash did not close properly last time. It had open:")
     widgets.muted(kept.sentence())
     widgets.gap(look.px(2))
-    if widgets.primary_button("Go on with it", look.vec(140, 0)):
+    if widgets.primary_button("Restore", look.vec(140, 0)):
         issued.append(keep.EndSessionOffer(restore=True))
     imgui.same_line()
-    if imgui.button("Forget it", look.vec(120, 0)):
+    if imgui.button("Discard", look.vec(120, 0)):
         issued.append(keep.EndSessionOffer(restore=False))
     imgui.end()
     imgui.pop_style_color()
@@ -127,7 +127,7 @@ def draw_edits_offer(state: State, look: Look, place: ImVec2, size: ImVec2) -> l
         widgets.beside(look.px(_ANSWER))
         if imgui.button("Later", look.vec(_ANSWER, 0)):
             issued.append(keep.EndOffer())
-        widgets.tooltip("They are offered again next time")
+        widgets.tooltip("You will be asked again next time")
         widgets.beside(look.px(_ANSWER))
         if imgui.button("Forget them", look.vec(_ANSWER, 0)):
             issued.append(keep.EndOffer(forget=True))

@@ -89,12 +89,12 @@ def _read(stored: bytes, path: Path) -> tuple[Preferences, str]:
     except (ValueError, RecursionError):
         return DEFAULTS, f"The preferences could not be read, so the defaults are used; see {path}."
     if not isinstance(content, dict):
-        return DEFAULTS, f"The preferences hold something else, so the defaults are used; see {path}."
+        return DEFAULTS, f"The preferences file holds something else, so the defaults are used; see {path}."
     known = {field.name for field in fields(Preferences)}
     good: dict[str, Any] = {name: _fitting(name, value) for name, value in content.items() if name in known}
     lost = sorted(name for name, value in good.items() if value is None)
     kept = {name: value for name, value in good.items() if value is not None}
-    sentence = f"Some preferences could not be used ({', '.join(lost)}); their defaults are." if lost else ""
+    sentence = f"Some preferences could not be read, so defaults are used: {', '.join(lost)}." if lost else ""
     return Preferences(**kept), sentence
 
 
@@ -151,7 +151,7 @@ def _kept_by_others(path: Path, own: Preferences) -> Preferences:
         stored = path.read_bytes()
     except OSError as error:
         reason = error.strerror or error
-        raise OutputError(f"cannot read {path}, where other windows keep theirs: {reason}") from error
+        raise OutputError(f"cannot read {path}, which other windows also use: {reason}") from error
     theirs, complaint = _read(stored, path)
     return own if complaint and theirs == DEFAULTS else theirs
 
@@ -161,7 +161,7 @@ def try_to_save(preferences: Preferences, since: Preferences | None = None) -> s
     try:
         save(preferences, since=since)
     except OutputError as error:
-        return f"The preferences are not kept: {error}."
+        return f"The preferences could not be saved: {error}."
     return ""
 
 

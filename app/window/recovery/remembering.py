@@ -180,7 +180,7 @@ class RememberingEffects(Effects):
         try:
             work()
         except LangFlashError as error:
-            self._hands.dispatch(Log("error", f"What was open is not remembered: {error}."))
+            self._hands.dispatch(Log("error", f"What was open could not be remembered: {error}."))
 
 
 def _project(state: State) -> Project | None:

@@ -97,8 +97,8 @@ class SwitchRays:
 
 
 NOT_SEEN = (
-    "No photo looked from there; this is as near as they show it. "
-    'With parallel rays (comma), or without "Keep to what the photos saw" (Preferences), you may go on.'
+    "No photo was taken from there, so the view stops here. To go further, use parallel rays (comma), "
+    'or switch off "Stay near the photos" (Preferences).'
 )
 
 

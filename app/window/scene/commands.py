@@ -56,7 +56,7 @@ class AddPhotos:
         after = state.with_scene(photos=photos[:MAX_PHOTOS])
         if len(photos) > MAX_PHOTOS:
             left = len(photos) - MAX_PHOTOS
-            text = f"{left} photos were left out: at most {MAX_PHOTOS} make one scene; clear the tray first."
+            text = f"{left} photos were left out: a scene takes at most {MAX_PHOTOS}; clear the tray first."
             after = Notify(text).apply(after)
         return after
 
@@ -173,7 +173,7 @@ class ChoosePair:
 
     def apply(self, state: State) -> State:
         if len(state.scene.photos) < 3:
-            text = "Choosing needs three photos or more; drop some on the window."
+            text = "Choosing needs three or more photos; drop some on the window."
             return Notify(text).apply(state)
         return state.with_scene(choosing=True)
 
@@ -474,13 +474,13 @@ class Merged:
     def apply(self, state: State) -> State:
         if self.fits(state):
             return state
-        text = f"{self.name} was not merged, since another scene is on show by now; merge it again."
+        text = f"{self.name} was not merged, since another scene is open now; merge it again."
         if self.denied:
-            text = "Nothing was taken out, since the scene is another by now; click it again."
+            text = "Nothing was removed, since the scene has changed; click it again."
         elif self.copied:
-            text = "Nothing was copied, since the scene is another by now; copy it again."
+            text = "Nothing was copied, since the scene has changed; copy it again."
         elif self.gone is not None:
-            text = "Nothing was filled, since the scene is another by now; fill it again."
+            text = "Nothing was filled, since the scene has changed; fill it again."
         return Notify(text).apply(state.with_scene(job=None))
 
     def arrival(self, state: State) -> "SceneArrived":
@@ -499,7 +499,7 @@ class Merged:
             label = f"Clone {len(brought):,}" if self.copied else f"Delete and fill {len(self.gone):,}"
             if self.denied:
                 after = deny_atom(after, whole.there[1] - 1, self.denied)
-                label = f"Take a part out of {self.denied}"
+                label = f"Remove a part of {self.denied}"
         elif self.copied:
             label = f"Copy {len(brought):,}"
         history = before.edited(label, after)

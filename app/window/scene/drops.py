@@ -170,7 +170,7 @@ def _folder(path: Path) -> Drop:
 def told_few(sentences: tuple[str, ...]) -> tuple[str, ...]:
     """What fits on the screen: the first ones, and how many more there are."""
     shown, more = sentences[:_TOLD], len(sentences) - _TOLD
-    return (*shown, f"{more} more of these could not be opened, for like reasons.") if more > 0 else shown
+    return (*shown, f"{more} more could not be opened, for similar reasons.") if more > 0 else shown
 
 
 def _each_once(paths: Iterable[Path]) -> tuple[Path, ...]:

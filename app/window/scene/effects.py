@@ -173,7 +173,9 @@ class SceneEffects(Effects):
             perform(Notify(f"Only {drop.films[0].name} was opened; drop one film at a time."))
         if drop.scenes and (drop.photos or drop.films):
             came = "photos" if drop.photos else "a film"
-            perform(Notify(f"{drop.scenes[0].name} was not opened, for {came} came with it; open it alone."))
+            perform(
+                Notify(f"{drop.scenes[0].name} was not opened, since {came} came with it; open it alone.")
+            )
         elif len(drop.scenes) > 1:
             perform(Notify(f"Only {drop.scenes[0].name} was opened; open one scene at a time."))
         if drop.photos and state.scene.info is not None:

@@ -11,8 +11,8 @@ from ..editing.commands import with_edit
 from ..state import State
 from .camera import FlyTo
 
-LOOKING = "Looking for the floor, and for what is upright ..."
-UNSURE = "Its photos do not tell for sure which way is up, so this is a guess; undo it (Ctrl+Z) if it leans."
+LOOKING = "Finding the floor ..."
+UNSURE = "The photos do not clearly show which way is up, so this is a guess; Ctrl+Z undoes it."
 
 
 @dataclass(frozen=True)
@@ -36,7 +36,11 @@ class Levelled:
         if marks is None:
             return state
         stands = world_line(self.world, state.metric)
-        text = f"The scene is level already: {stands}." if marks.world == self.world else f"Level: {stands}."
+        text = (
+            f"The scene is level already: {stands}."
+            if marks.world == self.world
+            else f"{stands[:1].upper()}{stands[1:]}."
+        )
         told = tuple(toast for toast in state.toasts if toast.text != LOOKING)
         after = with_edit(replace(state, toasts=told), "Level the scene", replace(marks, world=self.world))
         after = Notify(text if self.world.sure else f"{UNSURE} {text}", "info").apply(after)

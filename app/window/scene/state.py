@@ -60,7 +60,7 @@ class TakenOut:
     before: "TakenOut | None" = field(default=None, repr=False)
 
 
-PAUSED = "Paused. Resume goes on from there, also when the program was closed and the same photos are opened."
+PAUSED = "Paused. Resume continues from here, even after you quit and open the same photos again."
 RECONSTRUCTING, RESTORING = "Reconstructing", "Restoring"
 """Titles of the jobs that make a scene out of the tray, and out of what an earlier session kept."""
 
@@ -72,25 +72,25 @@ LOOKING_THROUGH = "film"
 
 _SAID = {
     LOOKING_THROUGH: "looking through the film",
-    "photos": "reading the photos",
-    "weights": "waking the network",
-    "network": "looking at the photos",
-    "encoder": "looking at the photos",
-    "language features": "what each part means",
-    "grouping": "what belongs together",
-    "aggregation": "what each thing is",
-    "depth": "how far everything is",
-    "poses": "where the cameras stood",
-    "point maps": "how far everything is",
+    "photos": "opening photos",
+    "weights": "loading the network",
+    "network": "reading photos",
+    "encoder": "reading photos",
+    "language features": "naming things",
+    "grouping": "grouping what belongs together",
+    "aggregation": "naming each group",
+    "depth": "measuring depth",
+    "poses": "finding the cameras",
+    "point maps": "measuring depth",
     "refinement": "sharpening edges and surfaces",
-    "Gaussians": "placing the Gaussians",
+    "Gaussians": "placing Gaussians",
     "assemble": "putting it together",
-    "light": "bringing the photos to one light",
+    "light": "matching the light of the photos",
     "elements": "covering surfaces with Gaussians",
-    "colours": "finding their colours",
+    "colours": "matching colours",
     "prune": "tidying up",
-    "refine": "fitting it to the photos",
-    "level": "finding its floor",
+    "refine": "fitting to the photos",
+    "level": "finding the floor",
 }
 
 

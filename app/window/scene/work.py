@@ -106,7 +106,7 @@ class LoadScene(Job):
         from langflash_core.export import read as read_scene
 
         if self.edits is not None and not (self.edits.is_file() and self.path.is_file()):
-            raise SceneFileError("what was kept is not there any more; another window goes on with it")
+            raise SceneFileError("the saved progress is gone; another window is using it")
         scene = read_scene(self.path)
         if self.edits is not None:
             return SceneArrived(_restored(describe_scene(scene, serial, ""), self.edits), self.alone)

@@ -186,7 +186,7 @@ class Play:
     def apply(self, state: State) -> State:
         stops: tuple[Pose, ...] = tuple(stop.pose for stop in state.tour.stops)
         if len(stops) < 2:
-            text = "A tour needs two stops or more; fly somewhere and add one."
+            text = "A tour needs two or more stops; fly somewhere and add one."
             return Notify(text, "info").apply(state)
         return state.with_filming(tour=Walk(stops, state.now)).with_scene(flight=None, view=None)
 

@@ -29,7 +29,7 @@ def button(state: State) -> list[do.Command]:
     label = f"{fa.ICON_FA_SIGNS_POST}##tour"
     pressed = widgets.primary_button(label) if state.touring.open else imgui.button(label)
     imgui.end_disabled()
-    widgets.tooltip("A guided tour: stops with names, and notes; films and web pages follow it")
+    widgets.tooltip("Guided tour: named stops and notes, for films and web pages")
     imgui.same_line()
     return [tour.ShowTour(not state.touring.open)] if pressed else []
 
@@ -72,10 +72,10 @@ def _bar(state: State, look: Look) -> list[do.Command]:
     wide, playing = ImVec2(look.px(_BUTTON), 0), state.filming.tour is not None
     imgui.begin_disabled(not state.tour.stops)
     for icon, tip, command in (
-        (fa.ICON_FA_BACKWARD_STEP, "The stop before  (Page up)", tour.Step(-1)),
-        (fa.ICON_FA_STOP if playing else fa.ICON_FA_PLAY, "Past all stops, as a film goes",
+        (fa.ICON_FA_BACKWARD_STEP, "Previous stop  (PgUp)", tour.Step(-1)),
+        (fa.ICON_FA_STOP if playing else fa.ICON_FA_PLAY, "Play the tour",
          film.StopTour() if playing else tour.Play()),
-        (fa.ICON_FA_FORWARD_STEP, "The next stop  (Page down)", tour.Step(1)),
+        (fa.ICON_FA_FORWARD_STEP, "Next stop  (PgDn)", tour.Step(1)),
     ):  # fmt: skip
         if imgui.button(f"{icon}##{tip}", wide):
             issued.append(command)
@@ -84,7 +84,7 @@ def _bar(state: State, look: Look) -> list[do.Command]:
     imgui.end_disabled()
     if widgets.primary_button(f"{fa.ICON_FA_PLUS}  Add this view"):
         issued.append(tour.AddStop())
-    widgets.tooltip("The present view as the next stop, with the phrase that is on show")
+    widgets.tooltip("Add this view as the next stop, with the active phrase")
     return issued
 
 
@@ -106,7 +106,7 @@ def _stop(state: State, number: int, stop: Stop, look: Look) -> list[do.Command]
     widgets.whole(stop.name, "Its name")
     start, last = state.tour.start == stop.name, len(state.tour.stops) - 1
     for icon, tip, command, can in (
-        (fa.ICON_FA_FLAG, "Pages open at the first photo" if start else "Pages of the scene open here",
+        (fa.ICON_FA_FLAG, "Web pages open at the first photo" if start else "Web pages open here",
          tour.StartAt("" if start else stop.name), True),
         (fa.ICON_FA_ARROW_UP, "Earlier", tour.MoveStop(number, number - 1), number > 0),
         (fa.ICON_FA_ARROW_DOWN, "Later", tour.MoveStop(number, number + 1), number < last),
@@ -128,16 +128,16 @@ def _stop(state: State, number: int, stop: Stop, look: Look) -> list[do.Command]
 def _told(number: int, stop: Stop) -> list[do.Command]:
     """What is told at the stop where one is."""
     imgui.set_next_item_width(-1)
-    _, text = imgui.input_text_with_hint("##text", "what is told here", stop.text)
+    _, text = imgui.input_text_with_hint("##text", "text shown here", stop.text)
     changed = imgui.is_item_deactivated_after_edit() and text != stop.text
     widgets.whole(stop.text, "")
-    text, told = _cut(text, LONGEST_TEXT, "What is told at a stop")
+    text, told = _cut(text, LONGEST_TEXT, "The text shown at a stop")
     return [tour.ChangeStop(number, text=text), *told] if changed else []
 
 
 def _cut(text: str, most: int, what: str) -> tuple[str, list[do.Command]]:
     """As much of what was typed as there is room for; refused, all of it would be lost."""
-    told = do.Notify(f"{what} has at most {most} letters; the rest of it was left out.", "info")
+    told = do.Notify(f"{what} has at most {most} letters; the rest was left out.", "info")
     return text.strip()[:most], [told] if len(text.strip()) > most else []
 
 
@@ -150,7 +150,7 @@ def _note(state: State, number: int, note: Note, look: Look) -> list[do.Command]
     if imgui.button(f"{icon}##ask", wide):
         issued.append(tour.AskNote(number))
     imgui.end_disabled()
-    widgets.tooltip(f'Ask "{note.phrase}"' if note.phrase else _measured(state, note) or "It asks nothing")
+    widgets.tooltip(f'Ask "{note.phrase}"' if note.phrase else _measured(state, note) or "No phrase")
     imgui.same_line(0, gap)
     imgui.set_next_item_width(imgui.get_content_region_avail().x - look.px(_BUTTON) - gap)
     _, text = imgui.input_text("##text", note.text)

@@ -63,7 +63,7 @@ def chosen_stretches(
     if not starts or min(photos) < 2:
         raise InputError(
             f"--photos needs two or more, and photos {length} numbers apart that look the same way; "
-            "leave it away to judge pairs"
+            "leave it out to judge pairs"
         )
     wanted = min(count, len(starts))
     firsts = [starts[(2 * k + 1) * len(starts) // (2 * wanted)] for k in range(wanted)]

@@ -102,7 +102,7 @@ def depth_scales(said: list[Float[np.ndarray, " _"]]) -> Float[np.ndarray, " V"]
     if len(everything) < _FEWEST:
         raise InputError(
             "the photos do not fit the poses: too little of them matches where the poses say it must; "
-            "check that poses and photos belong together, or leave --poses away"
+            "check that poses and photos belong together, or leave --poses out"
         )
     common = np.median(everything)
     return np.exp([np.median(own) if len(own) >= _FEWEST else common for own in said])

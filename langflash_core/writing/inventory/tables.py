@@ -18,7 +18,7 @@ COLUMNS = (
 
 
 def entry(thing: Thing) -> dict[str, Any]:
-    """One thing in plain values, lengths in the inventory's unit to a thousandth."""
+    """One thing in plain values, lengths in the inventory's unit to a thousandth, photos counted from 1."""
     width, depth, height = (round(side, 3) for side in thing.size)
     return {
         "id": thing.id,
@@ -32,7 +32,7 @@ def entry(thing: Thing) -> dict[str, Any]:
         "east": round(thing.place[0], 3),
         "north": round(thing.place[2], 3),
         "turn": round(thing.turn, 1),
-        "photos": list(thing.photos),
+        "photos": [view + 1 for view in thing.photos],
         "cut": thing.cut,
     }
 
@@ -44,7 +44,7 @@ def table_csv(found: Inventory) -> str:
     table.writerow(COLUMNS)
     for thing in found.things:
         row = entry(thing) | {"unit": found.unit, "guessed": found.guess is not None}
-        row["photos"] = " ".join(map(str, thing.photos))
+        row["photos"] = " ".join(map(str, row["photos"]))
         table.writerow(row[name] for name in COLUMNS)
     return stream.getvalue()
 

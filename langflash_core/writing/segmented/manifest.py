@@ -10,8 +10,9 @@ from langflash_core.writing.subject import Subject, boxes
 
 
 def folder_name(number: int | None) -> str:
-    """Where a view's files are: of a photo by its number, of a camera that was described without."""
-    return "camera" if number is None else f"view_{number}"
+    """Where a view's files are: of a photo by its number as people count, of a camera that was described
+    without."""
+    return "camera" if number is None else f"photo_{number + 1}"
 
 
 def document(
@@ -73,7 +74,7 @@ def _view(
 ) -> dict[str, Any]:
     photos = subject.scene.record.photos
     return {
-        "view": number,
+        "view": None if number is None else number + 1,
         "photo": photos[number] if number is not None and number < len(photos) else None,
         "folder": folder_name(number),
         "width": camera.width,

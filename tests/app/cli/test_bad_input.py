@@ -166,9 +166,19 @@ def test_photo_as_scene(refused, photo, tmp_path):
     assert photo.name in refused("render", photo, "-o", tmp_path / "a.png")
 
 
-@pytest.mark.parametrize("view", ["2", "99999", "-1", "first", "1.5"])
+@pytest.mark.parametrize("view", ["3", "99999", "-1", "first", "1.5"])
 def test_unknown_view(refused, scene_file, tmp_path, view):
     assert "view" in refused("render", scene_file, f"--view={view}", "-o", tmp_path / "a.png")
+
+
+@pytest.mark.parametrize(
+    "words", [("render",), ("query", "armchair"), ("export",)], ids=lambda words: words[0]
+)
+def test_the_number_of_a_photo_as_it_was_counted_before(refused, scene_file, tmp_path, words):
+    """0 was the first photo; it is not taken for another one."""
+    command, *phrases = words
+    said = refused(command, scene_file, *phrases, "--view", "0", "-o", tmp_path / "a.png")
+    assert "photos count from 1" in said
 
 
 @pytest.mark.parametrize("prompt", ["", "   ", "\n\t"])
@@ -189,7 +199,7 @@ def test_empty_prompt(refused, scene_file, tmp_path, prompt):
         (["--what", "weights:-1"], "whole number"),
         (["--what", "rgb:1"], "weights:K"),
         (["--what", "smell"], "weights:K"),
-        (["--view", "0", "--camera", "x.json"], "not allowed with"),
+        (["--view", "1", "--camera", "x.json"], "not allowed with"),
         (["--backend", "paint"], "--backend"),
     ],
 )

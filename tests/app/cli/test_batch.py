@@ -161,7 +161,7 @@ def test_interrupted(sets, tmp_path):
     assert child.stderr.readline().startswith("[1/3] a: done")
     os.killpg(child.pid, signal.SIGINT)  # as a terminal does: to the workers, too
     _, rest = child.communicate(timeout=600)
-    assert child.returncode == 130 and rest == "langflash: stopped; the same command goes on from here\n"
+    assert child.returncode == 130 and rest == "langflash: stopped; the same command continues from here\n"
     first = rows(tmp_path / "out")
     assert first["a"]["status"] == "done"
     # On a busy machine the next set may have come to its end, before or after the ledger closed.

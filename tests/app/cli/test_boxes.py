@@ -1,6 +1,7 @@
 """`langflash export --what boxes`: the same places and sizes as JSON, as a table and as bodies."""
 
 import csv
+import io
 import json
 import weakref
 from dataclasses import replace
@@ -8,9 +9,11 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import trimesh
+from PIL import Image
 
 import langflash_core
 from langflash_core import pipeline
+from tests.app.cli.conftest import HEIGHT, WIDTH, stripes
 from tests.app.cli.test_bad_input import refused  # noqa: F401
 
 ASKED = ("--what", "boxes", "--prompt", "armchair", "submarine", "--backend", "torch")
@@ -32,9 +35,26 @@ def test_three_files_say_the_same(run, scene_file, tmp_path):
     assert [float(table[0][f"size_{axis}"]) for axis in "xyz"] == box["size"]
     assert table[1]["center_x"] == ""
     bodies = trimesh.load_scene(exported(run, scene_file, tmp_path / "a.glb"))
-    assert list(bodies.geometry) == ["armchair (view 0)"]
+    assert list(bodies.geometry) == ["armchair (photo 1)"]
     (corners,) = bodies.bounds[None]
     np.testing.assert_allclose(corners.mean(0), np.array(box["center"]) * [-1, -1, 1], atol=1e-5)
+
+
+def test_boxes_are_measured_in_a_view_as_large_as_its_photo(run, tmp_path, monkeypatch):
+    """The network sees photos much smaller, and small things not at all."""
+    sizes, query, stream = [], pipeline.query, io.BytesIO()
+
+    def watched(*args, camera, **options):
+        sizes.append((camera.width, camera.height))
+        return query(*args, camera=camera, **options)
+
+    Image.new("RGB", (2 * WIDTH, 2 * HEIGHT)).save(stream, "JPEG")
+    scene = tmp_path / "scene.langflash"
+    langflash_core.save(replace(stripes(), photos=(stream.getvalue(),) * 2), scene)
+    monkeypatch.setattr(pipeline, "query", watched)
+    exported(run, scene, tmp_path / "a.json")
+    exported(run, scene, tmp_path / "b.json", "--size", "28x21")
+    assert sizes == [(2 * WIDTH, 2 * HEIGHT), (28, 21)]
 
 
 def test_every_photo_has_its_boxes(run, scene_file, tmp_path):

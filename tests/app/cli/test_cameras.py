@@ -56,7 +56,7 @@ def test_at_full_size_a_view_has_the_pixels_of_its_photo():
 
 
 def test_unknown_view_names_the_range():
-    with pytest.raises(ViewError, match="--view 0 to 1"):
+    with pytest.raises(ViewError, match="no photo 3: this scene has 2; use --view 1 to 2"):
         choice(view=2).of(stripes())
 
 

@@ -37,7 +37,7 @@ def test_query(run, scene_file, tmp_path, backend):
     )
     assert outcome.code == 0, outcome.err
     document = outcome.json()
-    assert document["backend"] == backend and document["view"] == 0 and document["mode"] == "relevancy"
+    assert document["backend"] == backend and document["view"] == 1 and document["mode"] == "relevancy"
     assert document["size"] == [WIDTH, HEIGHT] and document["unit"] == "scene"
     chair, submarine = document["prompts"]
     assert chair["prompt"] == "armchair" and chair["found"] and chair["score"] >= chair["threshold"]
@@ -81,7 +81,7 @@ def test_backends_agree(run, scene_file, tmp_path):
             "--backend",
             backend,
             "--view",
-            "1",
+            "2",
         )
         arrays[backend] = np.load(tmp_path / backend / "query.npz")
     exact, drawn = arrays["torch"], arrays["gl"]
@@ -215,6 +215,9 @@ def test_pictures_have_the_size_of_the_photos(run, tmp_path):
     assert np.load(tmp_path / "numbers.npz")["mask"].shape == (1, *full)
     for name in ("mask.png", "cut.png"):
         assert pixels(tmp_path / name).shape[:2] == full
+    words = ("--segmented", "--prompt", "armchair", "--view", "2", *TORCH)
+    assert run("export", scene, "-o", tmp_path / "folder", *words).code == 0
+    assert pixels(tmp_path / "folder" / "photo_2" / "armchair_mask.png").shape == full
 
 
 @pytest.mark.parametrize("backend", ["torch", "gl"])
@@ -319,7 +322,7 @@ def test_what_no_photo_looked_at_from_there_fades(run, of_photos, tmp_path, back
     plain, aside = tmp_path / "plain.png", tmp_path / "camera.json"
     aside_of(of_photos, aside)
     pictures = {}
-    for place in (["--view", "0"], ["--camera", str(aside)]):
+    for place in (["--view", "1"], ["--camera", str(aside)]):
         for fade in ([], ["--fade"]):
             outcome = run("render", of_photos, "-o", plain, *place, *fade, "--backend", backend)
             assert outcome.code == 0, outcome.err
@@ -330,7 +333,7 @@ def test_what_no_photo_looked_at_from_there_fades(run, of_photos, tmp_path, back
 
 def test_only_views_of_known_photos_fade(run, scene_file, of_photos, tmp_path):
     outcome = run("export", of_photos, "-o", tmp_path / "a.ply", "--fade")
-    assert outcome.code == 2 and "leave --fade away" in outcome.err
+    assert outcome.code == 2 and "leave --fade out" in outcome.err
     assert run("export", of_photos, "-o", tmp_path / "a.png", "--fade", *TORCH).code == 0
     outcome = run("export", scene_file, "-o", tmp_path / "b.png", "--fade", *TORCH)
     assert outcome.code == 2 and "leave --fade out" in outcome.err and not (tmp_path / "b.png").exists()

@@ -49,11 +49,11 @@ def test_stopped_it_says_where_it_goes_on_and_does(run, tmp_path, work):
     words = ("reconstruct", *PHOTOS, "-o", tmp_path / "a.langflash", "--size", 56, "--keep", kept)
     stopped = run(*words)
     assert stopped.code == 130
-    said = f"langflash: stopped; what is done is kept in {kept}, the same command goes on from there\n"
+    said = f"langflash: stopped; progress is saved in {kept}, the same command continues from there\n"
     assert stopped.err == said and len(list(kept.iterdir())) == 1
     work["stop"] = False
     done = run(*words)
-    assert done.code == 0 and done.err == f"going on from what an earlier run kept in {kept}\n"
+    assert done.code == 0 and done.err == f"continuing from the progress saved in {kept}\n"
     assert (tmp_path / "a.langflash").is_file() and not kept.exists()
     assert run(*words).err == "", "nothing is left to go on from"
 

@@ -19,11 +19,11 @@ def test_it_says_how_a_scene_stands_and_keeps_it(run, room_file, tmp_path):
     out = tmp_path / "new" / "level.langflash"
     done = run("level", room_file, "-o", out)
     assert done.code == 0, done.err
-    assert "on its floor" in done.out and "a guess from door and ceiling" in done.out
+    assert "floor found" in done.out and "scale guessed from door and ceiling" in done.out
     world = load(out).record.world
     assert world is not None and world.guess is not None and load(out).record.metric_scale is None
     told = run("info", out)
-    assert "world: up as surfaces tell it" in told.out
+    assert "world: levelled by surfaces" in told.out
     assert run("info", "--json", out).json()["world"]["floor_by"] == "floor"
     again = run("level", room_file, "--json").json()
     assert again["world"]["turn"] == list(world.turn) and again["metric_scale"] is None
@@ -32,12 +32,12 @@ def test_it_says_how_a_scene_stands_and_keeps_it(run, room_file, tmp_path):
 def test_a_known_length_puts_metres_into_the_scene(run, room_file, tmp_path):
     out = tmp_path / "level.langflash"
     done = run("level", room_file, "--ceiling", "2.6", "-o", out)
-    assert done.code == 0 and "as you told it" in done.out
-    assert "a guess" not in done.out + run("info", out).out, "two lengths of a unit, and one is wrong"
+    assert done.code == 0 and "as you said" in done.out
+    assert "guessed" not in done.out + run("info", out).out, "two lengths of a unit, and one is wrong"
     assert load(out).record.metric_scale == pytest.approx(METRES, rel=0.02)
     done = run("level", room_file, "--length", "0,0,0", "0,0,1.5", "3", "--json")
     assert done.json()["metric_scale"] == pytest.approx(2.0)
-    done = run("level", room_file, "--length", "0:20,30", "0:70,30", "3", "--json")
+    done = run("level", room_file, "--length", "1:20,30", "1:70,30", "3", "--json")
     assert done.json()["metric_scale"] > 0
 
 
@@ -61,7 +61,8 @@ def test_an_upright_export_stands_level_in_metres_in_every_kind_of_file(run, roo
         (("--length", "0,0,0", "0,0,0", "2"), "one point"),
         (("--length", "0,0", "0,0,1", "2"), "points"),
         (("--length", "0,0,0", "0,0,1", "long"), "metres"),
-        (("--length", "9:1,1", "0,0,1", "2"), "no pixel"),
+        (("--length", "9:1,1", "0,0,1", "2"), "photos 1 to"),
+        (("--length", "0:1,1", "0,0,1", "2"), "photos count from 1"),
         (("--up", "0,0,0"), "no length"),
         (("--up", "0,1"), "three numbers"),
         (("--ceiling", "-1"), "above 0"),

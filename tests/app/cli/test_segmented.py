@@ -63,7 +63,7 @@ def test_masks_are_of_what_was_asked(folder, manifest):
     armchair, lamp, submarine = manifest["phrases"]
     assert armchair["found"] and lamp["found"] and not submarine["found"] and not submarine["instances"]
     assert [each["name"] for each in armchair["instances"]] == ["armchair 1"]
-    view = folder / "view_0"
+    view = folder / "photo_1"
     mask, soft = pixels(view / "armchair_mask.png"), pixels(view / "armchair_soft.png")
     assert soft.dtype == np.uint16 and mask.shape == (HEIGHT, WIDTH)
     assert np.array_equal(mask == 255, soft >= 65535 / 2)
@@ -80,7 +80,7 @@ def test_masks_are_of_what_was_asked(folder, manifest):
 
 
 def test_depth_comes_back_by_the_scale_in_the_manifest(folder, manifest):
-    depth = pixels(folder / "view_0" / "depth.png") * manifest["depth"]["step"]
+    depth = pixels(folder / "photo_1" / "depth.png") * manifest["depth"]["step"]
     inside = depth[2:-2, 2:-2]
     assert manifest["unit"] == "scene" and np.abs(inside - 1).max() < 1e-3  # a wall at 1
     view = manifest["views"][1]
@@ -94,7 +94,7 @@ def test_a_scene_of_known_scale_is_in_metres(run, tmp_path):
     outcome = run("export", tmp_path / "m.langflash", "-o", tmp_path / "m", "--segmented", *ASKED, *TORCH)
     assert outcome.code == 0
     manifest = json.loads((tmp_path / "m" / "manifest.json").read_text("utf-8"))
-    depth = pixels(tmp_path / "m" / "view_0" / "depth.png") * manifest["depth"]["step"]
+    depth = pixels(tmp_path / "m" / "photo_1" / "depth.png") * manifest["depth"]["step"]
     assert manifest["unit"] == "m" and np.abs(depth[2:-2, 2:-2] - 2.5).max() < 3e-3
     box = manifest["phrases"][0]["instances"][0]["box"]
     assert box["center"][2] == pytest.approx(2.5, abs=1e-3)
@@ -119,18 +119,18 @@ def test_what_a_package_is_missing_for_is_left_out_and_said(run, scene_file, tmp
 
 
 def test_one_view_and_a_size(run, scene_file, tmp_path):
-    words = ("--segmented", "--view", "1", "--size", "28x21", *ASKED, *TORCH)
+    words = ("--segmented", "--view", "2", "--size", "28x21", *ASKED, *TORCH)
     assert run("export", scene_file, "-o", tmp_path / "out", *words).code == 0
-    assert {path.name for path in (tmp_path / "out").iterdir() if path.is_dir()} == {"view_1"}
-    assert pixels(tmp_path / "out" / "view_1" / "rgb.png").shape == (21, 28, 3)
+    assert {path.name for path in (tmp_path / "out").iterdir() if path.is_dir()} == {"photo_2"}
+    assert pixels(tmp_path / "out" / "photo_2" / "rgb.png").shape == (21, 28, 3)
     manifest = json.loads((tmp_path / "out" / "manifest.json").read_text("utf-8"))
-    assert "--view 1 --size 28x21" in manifest["command"] and manifest["views"][0]["view"] == 1
+    assert "--view 2 --size 28x21" in manifest["command"] and manifest["views"][0]["view"] == 2
 
 
 def test_phrases_may_be_called_union(run, scene_file, tmp_path):
     words = ("--segmented", "--threshold", "0.01", "--prompt", "union", "!?", *TORCH)
     assert run("export", scene_file, "-o", tmp_path / "out", *words).code == 0
-    names = {path.name for path in (tmp_path / "out" / "view_0").iterdir()}
+    names = {path.name for path in (tmp_path / "out" / "photo_1").iterdir()}
     assert {"union_mask.png", "union_2_mask.png", "prompt_2_mask.png"} <= names
 
 
@@ -139,10 +139,10 @@ def test_backends_agree(run, scene_file, tmp_path, folder):
         run("export", scene_file, "-o", tmp_path / "gl", "--segmented", *ASKED, "--backend", "gl").code == 0
     )
     for name in ("armchair_soft.png", "union_soft.png"):
-        exact, drawn = (pixels(place / "view_0" / name) / 65535.0 for place in (folder, tmp_path / "gl"))
+        exact, drawn = (pixels(place / "photo_1" / name) / 65535.0 for place in (folder, tmp_path / "gl"))
         assert np.abs(exact - drawn).max() < 5e-3  # sums in float16
     for name in ("labels.png", "instances.png"):
-        exact, drawn = (pixels(place / "view_0" / name) for place in (folder, tmp_path / "gl"))
+        exact, drawn = (pixels(place / "photo_1" / name) for place in (folder, tmp_path / "gl"))
         assert (exact != drawn).mean() < 5e-3  # pixels that are half of each
 
 
@@ -151,14 +151,14 @@ def test_single_pictures_are_those_of_the_folder(run, scene_file, tmp_path, fold
     words = ("--all-views", "--what", what, *ASKED, *TORCH)
     assert run("export", scene_file, "-o", tmp_path / "a.png", *words).code == 0
     name = "instances.png" if what == "instances" else f"union_{what}.png"
-    for view in range(2):
-        assert np.array_equal(pixels(tmp_path / f"a_{view}.png"), pixels(folder / f"view_{view}" / name))
-    assert (tmp_path / "a_0.json").exists() == (what == "instances")
+    for number in (1, 2):
+        assert np.array_equal(pixels(tmp_path / f"a_{number}.png"), pixels(folder / f"photo_{number}" / name))
+    assert (tmp_path / "a_1.json").exists() == (what == "instances")
 
 
 def test_single_depths(run, scene_file, tmp_path, folder, manifest):
     assert run("export", scene_file, "-o", tmp_path / "a.png", "--what", "depth", *TORCH).code == 0
-    first, again = pixels(folder / "view_0" / "depth.png"), pixels(tmp_path / "a.png")
+    first, again = pixels(folder / "photo_1" / "depth.png"), pixels(tmp_path / "a.png")
     with Image.open(tmp_path / "a.png") as picture:
         step = float(picture.info["step"])
     assert np.abs(first * manifest["depth"]["step"] - again * step).max() <= step + manifest["depth"]["step"]

@@ -100,7 +100,7 @@ def test_splat_files_have_no_language(refused, ply_file, tmp_path):
     ):
         assert "langflash reconstruct" in refused(*words, *TORCH)
     assert "no atoms" in refused("render", ply_file, "--what", "atoms", "-o", tmp_path / "a.png", *TORCH)
-    assert "no view 1" in refused("render", ply_file, "--view", "1", "-o", tmp_path / "a.png", *TORCH)
+    assert "no photo 2" in refused("render", ply_file, "--view", "2", "-o", tmp_path / "a.png", *TORCH)
 
 
 def test_a_page_holds_the_whole_scene_and_the_phrases(run, refused, scene_file, ply_file, tmp_path):
@@ -115,7 +115,7 @@ def test_a_page_holds_the_whole_scene_and_the_phrases(run, refused, scene_file, 
     outcome = run("export", ply_file, "-o", tmp_path / "new" / "plain.html")
     assert outcome.code == 0 and "answers" not in outcome.out
     page = tmp_path / "b.html"
-    assert "leave --view away" in refused("export", scene_file, "-o", page, "--view", "1")
+    assert "leave --view out" in refused("export", scene_file, "-o", page, "--view", "1")
     assert "is for videos" in refused("export", scene_file, "-o", page, "--seconds", "3")
     assert "is for web pages" in refused("export", scene_file, "-o", tmp_path / "b.ply", "--with-text")
     assert "'minilm' only" in refused("export", ply_file, "-o", page, "--with-text")
@@ -185,11 +185,12 @@ def test_coco_of_all_views_with_their_pictures(run, scene_file, tmp_path):
         (1, 1), (1, 2), (2, 1), (2, 2),
     }  # fmt: skip
     assert set(os.listdir(tmp_path)) == {"m.json", *(image["file_name"] for image in document["images"])}
+    assert [image["file_name"] for image in document["images"]] == ["m_1.png", "m_2.png"]
     for image in document["images"]:
         assert pixels(tmp_path / image["file_name"]).shape == (image["height"], image["width"], 3)
     x, _, width, _ = document["annotations"][0]["bbox"]
     assert x == 0 and abs(x + width - WIDTH / 3) < 4  # the left third, and a soft edge
-    assert run(*words, "--view", "1", "-o", tmp_path / "one.json").code == 0
+    assert run(*words, "--view", "2", "-o", tmp_path / "one.json").code == 0
     assert len(json.loads((tmp_path / "one.json").read_text())["images"]) == 1
 
 
@@ -227,7 +228,7 @@ def test_label_map_and_legend(run, scene_file, tmp_path):
 def test_what_lies_beside_is_replaced_only_by_its_own_kind(run, scene_file, tmp_path):
     """Nobody named these files: the legend of a label map, the pictures of a COCO file."""
     label = ("export", scene_file, "-o", tmp_path / "v.png", "--what", "labels", "--prompt", *WORDS, *TORCH)
-    masks = ("export", scene_file, "-o", tmp_path / "v.json", "--view", "0", "--prompt", *WORDS, *TORCH)
+    masks = ("export", scene_file, "-o", tmp_path / "v.json", "--view", "1", "--prompt", *WORDS, *TORCH)
     assert run(*masks).code == 0
     before = (tmp_path / "v.json").read_bytes()
     outcome = run(*label)
@@ -280,16 +281,16 @@ def test_video_without_its_package(refused, scene_file, tmp_path, monkeypatch):
         ("a.json", [], "--prompt"),
         ("a.png", ["--what", "labels"], "--prompt"),
         ("a.ply", ["--what", "labels", "--prompt", "armchair"], "takes a .png"),
-        ("a.ply", ["--view", "0"], "leave --view away"),
-        ("a.splat", ["--size", "9x9"], "leave --size away"),
-        ("a.mp4", ["--view", "0"], "leave --view away"),
+        ("a.ply", ["--view", "1"], "leave --view out"),
+        ("a.splat", ["--size", "9x9"], "leave --size out"),
+        ("a.mp4", ["--view", "1"], "leave --view out"),
         ("a.png", ["--seconds", "3"], "--seconds"),
         ("a.png", ["--path", "orbit"], "--path is for videos"),
         ("a.webp", ["--what", "heat"], "--prompt"),
         ("a.mp4", ["--what", "labels", "--prompt", "armchair"], "takes a .png"),
         ("a.png", ["--what", "surface", "--prompt", "armchair"], "takes a .glb"),
         ("a.glb", ["--what", "surface"], "--prompt"),
-        ("a.glb", ["--what", "surface", "--prompt", "armchair", "--view", "0"], "leave --view away"),
+        ("a.glb", ["--what", "surface", "--prompt", "armchair", "--view", "1"], "leave --view out"),
         ("a.png", ["--what", "instances"], "--prompt"),
         ("a.png", ["--what", "soft"], "--prompt"),
         ("a.png", ["--what", "depth", "--prompt", "armchair"], "takes no --prompt"),
@@ -297,7 +298,7 @@ def test_video_without_its_package(refused, scene_file, tmp_path, monkeypatch):
         ("a.ply", ["--what", "depth"], "takes a .png or .exr"),
         ("a", ["--segmented"], "--segmented needs phrases"),
         ("a", ["--segmented", "--prompt", "armchair", "--what", "mask"], "no --what"),
-        ("a", ["--segmented", "--prompt", "armchair", "--all-views"], "leave --all-views away"),
+        ("a", ["--segmented", "--prompt", "armchair", "--all-views"], "leave --all-views out"),
         ("a", ["--segmented", "--prompt", "armchair", "--seconds", "2"], "--seconds is for videos"),
         ("a", ["--segmented", "--prompt", "submarine", *TORCH], "lower --threshold"),
         ("a.mp4", ["--seconds", "0"], "--seconds"),

@@ -33,7 +33,7 @@ def test_a_tour_from_nothing_to_json_and_back(run, scene, tmp_path):
 
     assert "no tour" in done("list", scene)
     done("stop", scene, "Door", "--text", "Come in.")
-    done("stop", scene, "Window", "--view", "1", "--phrase", "armchair", "--start", "--place", "1")
+    done("stop", scene, "Window", "--view", "2", "--phrase", "armchair", "--start", "--place", "1")
     done("note", scene, "Lamp", "--at", "-0.1,0.2,1", "--phrase", "floor lamp")
     done("note", scene, "Width", "--at", "0,0,1", "--to", "0.3,0.4,1")
     listed = done("list", scene)
@@ -69,7 +69,8 @@ def test_a_note_finds_its_place_by_a_phrase(run, scene):
         (("note", "SCENE", "Lamp"), "needs a place"),
         (("note", "SCENE", "--phrase", "submarine", *TORCH), "not found in any view: submarine"),
         (("note", "SCENE", "Lamp", "--at", "1,2"), "expected X,Y,Z"),
-        (("stop", "SCENE", "Far", "--view", "9"), "there is no view 9"),
+        (("stop", "SCENE", "Far", "--view", "9"), "there is no photo 9: this scene has 2; use --view 1 to 2"),
+        (("stop", "SCENE", "Far", "--view", "0"), "photos count from 1"),
         (("stop", "SCENE", " "), "1 to 60 letters"),
         (("remove", "SCENE"), "nothing was named"),
         (("remove", "SCENE", "Cellar"), "no stop Cellar"),

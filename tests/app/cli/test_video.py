@@ -77,7 +77,7 @@ def test_between_key_frames_nothing_jumps_and_poses_stay_rigid(tmp_path):
         ([key(0, 0, time=1), key(0, 1, time=1)], None, "times must rise"),
         ([key(0, 0, time=0), key(0, 1, time="2")], None, "times must rise"),
         ([key(0, 0, time=0), key(0, 1, time=1e9)], None, "at most 600 seconds"),
-        ([key(0, 0, time=0), key(0, 1, time=2)], 3.0, "leave --seconds away"),
+        ([key(0, 0, time=0), key(0, 1, time=2)], 3.0, "leave --seconds out"),
     ],
 )
 def test_bad_key_frames_are_one_sentence(tmp_path, entries, seconds, hint):

@@ -77,6 +77,7 @@ def test_phrases_of_many_scenes_in_one_table(run, folder, tmp_path):
     assert scores == sorted(scores, reverse=True)
     rows = list(csv.DictReader((out / "answers.csv").read_text().splitlines()))
     assert len(rows) == 6 and [row["found"] for row in rows] == ["no"] * 3 + ["yes"] * 3
+    assert {row["view"] for row in rows} <= {"1", "2"}, "photos count from 1"
     for row in rows:
         with Image.open(out / row["picture"]) as picture:
             assert picture.size == (WIDTH, HEIGHT)

@@ -7,8 +7,10 @@ import pytest
 import torch
 
 from app.gl import SplatRenderer
+from langflash_core.export.png import glow_share
 from langflash_core.scene.gaps import filled
 from langflash_core.scene.trust import faded
+from langflash_core.types import LUMA
 from tests.app.gl.questions import question
 from tests.splat.scenes import camera, cloud, maps_of, parallel, scene_of, splats
 
@@ -58,6 +60,24 @@ def test_heat_over_the_photo_shows_only_what_passes(asked):
     everything = pixels(asked.heat_texture(0, threshold=0.0, span=(0.0, 1.0)))
     assert np.ptp(nothing[..., :3], axis=-1).max() < np.ptp(everything[..., :3], axis=-1).max()
     assert not np.array_equal(nothing, everything)
+
+
+def test_heat_covers_what_is_dark_and_lets_what_is_bright_through(asked):
+    """The same colours as in files, where the whole photo is found."""
+    frame = asked.frame()
+    covered = (frame.alphas >= 0.5).numpy()
+    under = (1 - frame.alphas)[..., None] * torch.tensor(
+        [0.0, 0.5, 1.0]
+    )  # the background, which is not in it
+    rgb = (frame.rgb - under).clamp(0, 1)
+    grey = (rgb * torch.tensor(LUMA)).sum(-1, keepdim=True)
+    shades = torch.from_numpy(
+        pixels(asked.heat_texture(0, threshold=0.0, over_rgb=False, span=(0.0, 1.0)))
+    ).float()
+    shown = pixels(asked.heat_texture(0, threshold=0.0, span=(0.0, 1.0)))
+    expected = torch.lerp(rgb, shades[..., :3], glow_share(grey)).numpy()
+    # Three roundings to eight bits, of which those of colours and brightness count at most once each.
+    np.testing.assert_allclose(shown[covered][:, :3], expected[covered], atol=2 / 255)
 
 
 def test_labels_are_the_argmax_or_none(asked):

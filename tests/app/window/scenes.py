@@ -93,8 +93,8 @@ def shown_scene(path: Path | None = Path("/rooms/my room.langflash")) -> State:
     """A state with a scene of two views and the phrase "door"."""
     scene = room(torch.eye(3))
     info = SceneInfo(
-        serial=1, name="room", scene=scene, views=VIEWS, num_gaussians=3, num_atoms=3,
-        space="minilm", path=path, extent=(Vector(-1.0, -1.0, 0.0), Vector(1.0, 1.0, 2.0)),
+        serial=1, name="room", scene=scene, views=VIEWS, num_gaussians=len(scene.gaussians.means),
+        num_atoms=3, space="minilm", path=path, extent=(Vector(-1.0, -1.0, 0.0), Vector(1.0, 1.0, 2.0)),
         history=History(first_marks(scene)),
     )  # fmt: skip
     return after(State(), SceneArrived(info), EditPrompt(0, "door"))

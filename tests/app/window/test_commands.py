@@ -78,8 +78,8 @@ def test_problems_are_shown_as_sentences(said: str, shown: str) -> None:
 
 def test_a_finer_picture_on_its_way_is_told_in_the_status_bar() -> None:
     state = shown_scene()
-    assert not any("finer" in text for text in figures(state))
+    assert not any("refining" in text for text in figures(state))
     drawing = replace(state, stats=replace(state.stats, settling=True))
-    assert "a finer picture is being drawn" in figures(drawing)
+    assert "refining ..." in figures(drawing)
     failed = replace(state, stats=replace(state.stats, failing=True))
-    assert any("could not be drawn" in text for text in figures(failed))
+    assert any("refining failed" in text for text in figures(failed))

@@ -180,7 +180,7 @@ def test_who_flew_out_of_the_scene_is_told_the_way_back() -> None:
     for z, past in ((0.0, False), (1.9, False), (2.1, True)):
         there = state.with_scene(info=known, pose=replace(Pose(), centre=Vector(0, 0, z)))
         assert flown_past(there) == past
-        assert any("H flies back" in text for text in figures(there)) == past
+        assert any("press H to go back" in text for text in figures(there)) == past
     turned = orbit(replace(Pose(), centre=Vector(0, 0, 3)), np.pi, 0.0)
     assert not flown_past(state.with_scene(info=known, pose=replace(turned, centre=Vector(0, 0, 3))))
     assert not flown_past(state)
@@ -209,4 +209,4 @@ def test_what_the_rest_means_is_said() -> None:
             frames(lambda at: cleaning.draw(edited(floaters=preview), at, *BIG), look(), 2)
     finally:
         widgets.tooltip = real
-    assert any("outside a box all goes" in text for text in seen)
+    assert any("all outside a box still goes" in text for text in seen)

@@ -252,7 +252,7 @@ def test_stages_are_said_in_plain_words() -> None:
 )
 def test_keys_lead_around_the_scene(way: str, axis: int, sign: int) -> None:
     state = shown_scene()
-    command = named(f"Orbit: a step {way}").make(state)
+    command = named(f"Orbit: {way}").make(state)
     assert command is not None
     turned = apply(state, command).scene.pose
     moved = state.scene.pose.axes.T @ (np.array(turned.centre) - np.array(state.scene.pose.centre))

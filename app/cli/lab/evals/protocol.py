@@ -63,7 +63,7 @@ def _nyu(args: Namespace, out: TextIO) -> None:
     """
     for name in ("index", "lpips", "align"):
         if getattr(args, name):
-            raise InputError(f"nyu judges photos one by one, without another view; leave --{name} away")
+            raise InputError(f"nyu judges photos one by one, without another view; leave --{name} out")
     folder = nyu_folder(args.folder)
     ids = folder.ids[: args.limit]
     from langflash_core.lab.evaluation.labelled import Tally, run_photos

@@ -33,7 +33,7 @@ def button(state: State) -> list[do.Command]:
     label = f"{fa.ICON_FA_BOOK}##dictionary"
     pressed = widgets.primary_button(label) if opened else imgui.button(label)
     imgui.end_disabled()
-    widgets.tooltip("The dictionary: what the scene is made of; name, silence, merge its groups")
+    widgets.tooltip("The dictionary: what the scene is made of; rename, mute or merge groups")
     return [ask.OpenDictionary(not opened)] if pressed else []
 
 
@@ -118,7 +118,7 @@ def _atoms(state: State, atoms: tuple[Atom, ...], look: Look) -> list[do.Command
     if widgets.primary_button(f"{fa.ICON_FA_OBJECT_GROUP}  {text}"):
         issued += [edit.MergeAtoms(chosen), ask.ChooseNone()]
     imgui.end_disabled()
-    widgets.tooltip("Tick two or more groups; the first ticked keeps its name.  Ctrl+Z undoes")
+    widgets.tooltip("Tick two or more groups to merge; the first keeps its name.  Ctrl+Z undoes")
     imgui.same_line()
     return issued + _others()
 
@@ -128,11 +128,11 @@ def _others() -> list[do.Command]:
     issued: list[do.Command] = []
     if imgui.button(f"{fa.ICON_FA_BOOKMARK}  Keep names"):
         issued.append(teach.KeepWords())
-    widgets.tooltip("For other scenes: there, groups that look like these can take your names")
+    widgets.tooltip("Save your names for similar groups in other scenes")
     imgui.same_line()
     if imgui.button(f"{fa.ICON_FA_WAND_MAGIC_SPARKLES}  Take names"):
         issued.append(teach.TakeWords())
-    widgets.tooltip("Groups that look like what you taught in other scenes take its name.  Ctrl+Z undoes")
+    widgets.tooltip("Give groups the names that you saved from similar ones in other scenes.  Ctrl+Z undoes")
     return issued
 
 
@@ -162,7 +162,7 @@ def _name(state: State, k: int, atom: Atom, room: float, look: Look) -> list[do.
         )
     if changed or (imgui.is_item_deactivated_after_edit() and name != atom.name):
         issued.append(edit.RenameAtom(k, name))
-    widgets.tooltip(f"Group {k}; type to name it")
+    widgets.tooltip(f"Group {k}; type a name")
     return issued
 
 
@@ -181,7 +181,7 @@ def _words(
     imgui.text_colored(theme.MUTED, widgets.shortened(words, left) + tail)
     _column(start + room - buttons)
     voice = fa.ICON_FA_VOLUME_HIGH if atom.on else fa.ICON_FA_VOLUME_XMARK
-    tip = "It answers phrases; click to silence it" if atom.on else "Silent; click to let it answer phrases"
+    tip = "It answers phrases; click to mute it" if atom.on else "Muted; click to let it answer phrases"
     if widgets.quiet_button(f"{voice}##voice", tip):
         issued.append(edit.ToggleAtom(k))
     _column(start + room - side)
@@ -228,9 +228,9 @@ def _similarity(state: State, atoms: tuple[Atom, ...], look: Look) -> None:
     """Cosines of all pairs, alike atoms side by side."""
     insight = state.asking.insight
     if insight is None:
-        widgets.muted("The groups are being looked over.")
+        widgets.muted("Comparing the groups ...")
         return
-    widgets.muted("Cosine of every pair; alike groups stand side by side.")
+    widgets.muted("Cosine of every pair; similar groups are side by side.")
     order = list(insight.order)
     matrix = insight.similarity[np.ix_(order, order)]
     count, room = len(order), imgui.get_content_region_avail()

@@ -13,9 +13,7 @@ from ..prompt_sets import MOST_PROMPTS
 from ..state import Prompt
 
 HINT = "a thing, e.g. armchair"
-ALGEBRA = (
-    "Phrases can be added and taken away:\nsofa + cushion\nchair - armchair\nwith spaces around + and -."
-)
+ALGEBRA = "Phrases can be added and subtracted:\nsofa + cushion\nchair - armchair\nPut spaces around + and -."
 _FLAGS = imgui.InputTextFlags_.callback_history
 
 
@@ -72,10 +70,10 @@ def tools(state: State, look: Look) -> list[do.Command]:
     if imgui.button(f"{fa.ICON_FA_PLUS}  Add a phrase"):
         issued.append(ask.AddPrompt())
     imgui.end_disabled()
-    widgets.tooltip("Enter in a phrase does the same")
+    widgets.tooltip("Or press Enter in a phrase")
     imgui.same_line(0, look.px(6))
     imgui.begin_disabled(not state.asking.recent)
-    if widgets.quiet_button(f"{fa.ICON_FA_CLOCK_ROTATE_LEFT}##recent", "Recent phrases; arrow up in a field"):
+    if widgets.quiet_button(f"{fa.ICON_FA_CLOCK_ROTATE_LEFT}##recent", "Recent phrases  (Up in a phrase)"):
         imgui.open_popup("recent")
     imgui.end_disabled()
     imgui.same_line(0, look.px(2))

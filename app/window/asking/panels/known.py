@@ -9,7 +9,7 @@ from ...state import State
 from .. import commands as ask
 from ..things import things
 
-KNOWS = "Names 72 % of a real room right among 37 kinds of things; understands English."
+KNOWS = "On real rooms, 72 % of the picture is named correctly (37 kinds of things). English only."
 """assets/weights/mini_card.md, "Real photos": atoms drawn, by area."""
 
 
@@ -22,7 +22,7 @@ def draw(state: State, look: Look) -> list[do.Command]:
     asked = {prompt.text.strip().lower() for prompt in state.asking.prompts}
     imgui.push_style_var(imgui.StyleVar_.frame_padding, look.vec(8, 3))
     imgui.align_text_to_frame_padding()
-    imgui.text_colored(theme.MUTED, "Here are")
+    imgui.text_colored(theme.MUTED, "In this scene:")
     right = imgui.get_cursor_screen_pos().x + imgui.get_content_region_avail().x
     for name in found:
         widgets.go_on(widgets.button_width(name), right, look.px(6))

@@ -32,11 +32,11 @@ def draw(state: State, look: Look) -> list[do.Command]:
     issued: list[do.Command] = []
     widgets.gap(look.px(2))
     parts = f"{len(listed)} part{'s' * (len(listed) != 1)}" if listed else "Parts"
-    count = parts + (f", {len(out)} taken out" if out else "")
+    count = parts + (f", {len(out)} removed" if out else "")
     shape = imgui.TreeNodeFlags_.no_tree_push_on_open | imgui.TreeNodeFlags_.span_avail_width
     with widgets.colours(text=theme.MUTED):
         opened = imgui.tree_node_ex(f"{count}###parts", shape | imgui.TreeNodeFlags_.default_open)
-    widgets.tooltip("What the answer is made of. A click with Ctrl in the picture takes a part out, or back")
+    widgets.tooltip("The parts of this answer. Ctrl+click one in the picture to remove it or bring it back")
     if not opened:
         return []
     busy = state.scene.job is not None
@@ -45,7 +45,7 @@ def draw(state: State, look: Look) -> list[do.Command]:
         issued += _row(text, number, part, busy, look)
         imgui.pop_id()
     if len(listed) > MOST:
-        widgets.muted(f"and {len(listed) - MOST} smaller ones; click them in the picture with Ctrl")
+        widgets.muted(f"and {len(listed) - MOST} smaller ones; Ctrl+click them in the picture")
     for k in out:
         imgui.push_id(f"out {k}")
         issued += _out(state, text, k)
@@ -66,7 +66,7 @@ def _row(text: str, number: int, part: Part, busy: bool, look: Look) -> list[do.
     figures = side + look.px(_BAR + 16) + imgui.calc_text_size("100%").x
     imgui.text_colored(theme.TEXT, widgets.shortened(f"{number}  {part.kind or 'something'}", room - figures))
     widgets.tooltip(
-        f"Looks like: {part.kind or 'nothing known'}; {part.share:.1%} of the photo that shows most"
+        f"Looks like: {part.kind or 'nothing it knows'}; {part.share:.1%} of the photo that shows it best"
     )
     imgui.same_line()
     imgui.set_cursor_pos_x(start + room - figures)
@@ -78,7 +78,7 @@ def _row(text: str, number: int, part: Part, busy: bool, look: Look) -> list[do.
         low, ImVec2(low.x + part.sure * look.px(_BAR), full.y), widgets.u32(theme.ACCENT), high / 2
     )
     imgui.dummy(ImVec2(look.px(_BAR), side))
-    widgets.tooltip(f"How sure it is that this is {text}")
+    widgets.tooltip(f"How likely this is {text}")
     figure = f"{part.sure:.0%}"
     imgui.same_line()
     imgui.set_cursor_pos_x(start + room - side - look.px(4) - imgui.calc_text_size(figure).x)
@@ -86,7 +86,7 @@ def _row(text: str, number: int, part: Part, busy: bool, look: Look) -> list[do.
     imgui.same_line()
     imgui.set_cursor_pos_x(start + room - side)
     imgui.begin_disabled(busy)
-    pressed = widgets.quiet_button(f"{fa.ICON_FA_XMARK}##out", "Take it out of the answer  (Ctrl+Z undoes)")
+    pressed = widgets.quiet_button(f"{fa.ICON_FA_XMARK}##out", "Remove it from the answer  (Ctrl+Z undoes)")
     imgui.end_disabled()
     return [parting.TakePartOut(text, part)] if pressed else []
 
@@ -96,10 +96,10 @@ def _out(state: State, text: str, k: int) -> list[do.Command]:
     start, room = imgui.get_cursor_pos_x(), imgui.get_content_region_avail().x
     side = imgui.get_frame_height()
     imgui.align_text_to_frame_padding()
-    imgui.text_colored(theme.MUTED, widgets.shortened(f"out: {state.editing.atom_name(k)}", room - side))
+    imgui.text_colored(theme.MUTED, widgets.shortened(f"removed: {state.editing.atom_name(k)}", room - side))
     imgui.same_line()
     imgui.set_cursor_pos_x(start + room - side)
-    pressed = widgets.quiet_button(f"{fa.ICON_FA_ROTATE_LEFT}##back", "Take it back into the answer")
+    pressed = widgets.quiet_button(f"{fa.ICON_FA_ROTATE_LEFT}##back", "Put it back into the answer")
     return [parting.TakePartBack(text, k)] if pressed else []
 
 

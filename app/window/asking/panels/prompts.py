@@ -68,7 +68,7 @@ def _phrase(state: State, prompt: Prompt, look: Look) -> list[do.Command]:
         changed, text = entry.field(state, prompt)
     issued += entry.finished(prompt.key, text)
     if prompt.like:
-        widgets.tooltip("Asks for what the place you clicked says; type to ask for words instead")
+        widgets.tooltip("Finds what looks like the place you clicked; type to search for words instead")
     if imgui.is_item_activated() and state.asking.active != prompt.key:
         issued.append(ask.SelectPrompt(prompt.key))
     if changed and not imgui.is_key_pressed(imgui.Key.escape):  # ImGui would take back what was typed
@@ -81,10 +81,10 @@ def _row_buttons(state: State, prompt: Prompt, look: Look) -> list[do.Command]:
     issued: list[do.Command] = []
     imgui.same_line(0, look.px(2))
     eye = fa.ICON_FA_EYE if prompt.visible else fa.ICON_FA_EYE_SLASH
-    if widgets.quiet_button(f"{eye}##eye", "Ask, or leave out"):
+    if widgets.quiet_button(f"{eye}##eye", "Show or hide this answer"):
         issued.append(ask.ShowPrompt(prompt.key, not prompt.visible))
     imgui.same_line(0, look.px(2))
-    tip = "Select the Gaussians that this phrase means; Shift adds, Ctrl removes"
+    tip = "Select what this phrase found; Shift adds, Ctrl removes"
     if widgets.quiet_button(f"{fa.ICON_FA_DRAW_POLYGON}##select", tip) and prompt.text.strip():
         io = imgui.get_io()
         combine = "add" if io.key_shift else "remove" if io.key_ctrl else state.editing.combine
@@ -110,7 +110,7 @@ def _verdict(prompt: Prompt, look: Look) -> list[do.Command]:
         imgui.text_colored(theme.GOOD, f"{fa.ICON_FA_CHECK} found")
     elif prompt.maybe:
         imgui.text_colored(theme.ACCENT, f"{fa.ICON_FA_QUESTION} maybe")
-        widgets.tooltip("Nearly: the picture shows faintly, in a ring, what comes nearest")
+        widgets.tooltip("Almost: the nearest match is ringed faintly in the picture")
     else:
         imgui.text_colored(theme.BAD, f"{fa.ICON_FA_XMARK} not found")
     if prompt.score is not None:
@@ -119,7 +119,7 @@ def _verdict(prompt: Prompt, look: Look) -> list[do.Command]:
     imgui.same_line(look.px(182))
     reset = look.px(30)
     width = imgui.get_content_region_avail().x - reset
-    tip = "Found from this score on"
+    tip = "Threshold: found from this score on"
     changed, cut = widgets.slider("##threshold", prompt.cut, (0.0, 1.0), f"{prompt.cut:.2f}", tip, width)
     if changed:
         issued.append(ask.SetThreshold(prompt.key, cut))
@@ -138,7 +138,7 @@ def _verdict(prompt: Prompt, look: Look) -> list[do.Command]:
 
 def _reading(prompt: Prompt, look: Look) -> list[do.Command]:
     """How the words are understood; a click takes that away."""
-    tip = "Ask the phrase as it stands, within quotes"
+    tip = "Search for exactly these words, in quotes"
     away = widgets.quiet_button(f"{fa.ICON_FA_XMARK}##whole", tip)
     imgui.same_line(0, look.px(4))
     imgui.align_text_to_frame_padding()
@@ -153,11 +153,11 @@ def _negatives(state: State) -> list[do.Command]:
         opened = imgui.tree_node_ex("Compared with", shape)
     if not opened:
         return issued
-    widgets.muted("A phrase counts where it fits better than each of these, separated by commas.")
+    widgets.muted("A phrase is found where it fits better than all of these (separated by commas).")
     imgui.set_next_item_width(-1)
     changed, text = imgui.input_text("##negatives", ", ".join(state.asking.negatives or state.asking.usual))
     if changed:
         issued.append(ask.SetNegatives(tuple(part.strip() for part in text.split(",") if part.strip())))
-    if state.asking.negatives and imgui.button("Back to the usual ones"):
+    if state.asking.negatives and imgui.button("Back to the defaults"):
         issued.append(ask.SetNegatives(()))
     return issued

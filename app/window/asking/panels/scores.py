@@ -37,7 +37,8 @@ def draw(state: State, look: Look) -> list[do.Command]:
     issued = _plot(prompt, np.array(found.counts, float), known, look)
     if known is not None and prompt.score is not None:
         share = 100 * known.at(prompt.score)
-        widgets.muted(f"On {known.on} {share:.0f} % of phrases that score {prompt.score:.2f} are there.")
+        score = f"{prompt.score:.2f}"
+        widgets.muted(f"On {known.on}, a score of {score} is right {share:.0f} % of the time.")
     return issued + _span(state, prompt, look)
 
 
@@ -53,7 +54,7 @@ def _span(state: State, prompt: Prompt, look: Look) -> list[do.Command]:
     widgets.tooltip("Relevance of the first and the last colour; drag, or double-click and type")
     imgui.same_line(0, look.px(2))
     imgui.begin_disabled(state.asking.span is None)
-    back = widgets.quiet_button(f"{fa.ICON_FA_ROTATE_LEFT}##span", "By the threshold")
+    back = widgets.quiet_button(f"{fa.ICON_FA_ROTATE_LEFT}##span", "Set it by the threshold again")
     imgui.end_disabled()
     if back:
         return [ask.SetSpan(None)]
@@ -95,11 +96,11 @@ def _plot(prompt: Prompt, counts: np.ndarray, known: Reliability | None, look: L
 
 
 def _tip(prompt: Prompt, counts: np.ndarray, known: Reliability | None) -> None:
-    line = f"\nThe line: how many phrases with such a score are there, on {known.on}." if known else ""
+    line = f"\nThe line: how often such a score is right, on {known.on}." if known else ""
     passing = counts[prompt.cut <= MIDDLES].sum() / max(counts.sum(), 1.0)
     imgui.set_tooltip(
-        f"{100 * passing:.1f} % of what is in view scores {prompt.cut:.2f} or more.\n"
-        f"Drag the threshold to move it; heights are logarithmic.{line}"
+        f"{100 * passing:.1f} % of the view scores {prompt.cut:.2f} or more.\n"
+        f"Drag the line to change the threshold. Heights are logarithmic.{line}"
     )
 
 

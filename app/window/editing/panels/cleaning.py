@@ -28,7 +28,7 @@ _NAMES = {
     "photos": "Photos", COLOUR: "Colour",
 }  # fmt: skip
 _TIPS = {
-    "confidence": "How sure its depth is, 0 to 1",
+    "confidence": "Certainty of its depth, 0 to 1",
     "size": "Its radius, scene units",
     "opacity": "0 (clear) to 1",
     "depth": "How far from the nearest photo's place, scene units",
@@ -110,7 +110,7 @@ def _rule(rule: Rule, look: Look) -> Rule | None:
         imgui.push_id(number)
         changed = _line(line, rule, look)
         imgui.same_line(0, look.px(4))
-        gone = widgets.quiet_button(fa.ICON_FA_XMARK, "Without this condition")
+        gone = widgets.quiet_button(fa.ICON_FA_XMARK, "Remove this condition")
         imgui.pop_id()
         if gone or changed is not None:
             kept = [] if gone or changed is None else [changed]
@@ -148,7 +148,7 @@ def _line(line: Condition, rule: Rule, look: Look) -> Condition | None:
     imgui.end_disabled()
     if turned:
         return replace(line, side=ABOVE if line.side == BELOW else BELOW)
-    widgets.tooltip("Click for the other side")
+    widgets.tooltip("Click to switch sides")
     imgui.same_line(0, look.px(4))
     imgui.set_next_item_width(look.px(_VALUE))
     low, high = _RANGES.get(line.name, (0.0, 1e6))
@@ -179,13 +179,13 @@ def _limits(preview: Floaters, look: Look) -> list[do.Command]:
     if imgui.is_item_deactivated_after_edit():
         phrases = tuple(each.strip() for each in text.split(",") if each.strip())
         issued.append(clean.ChangeRecipe({"within": phrases}))
-    widgets.tooltip("Only what answers one of these phrases")
-    changed, on = widgets.checkbox("All the rest instead", preview.recipe.invert)
+    widgets.tooltip("Only within what these phrases find")
+    changed, on = widgets.checkbox("Everything else instead", preview.recipe.invert)
     if changed:
         issued.append(clean.ChangeRecipe({"invert": on}))
     widgets.tooltip(
-        "What neither strength nor rules find; outside a box all goes as before.\n"
-        "For what is inside a box: Select, then Ctrl+I"
+        "What neither strength nor rules find; all outside a box still goes.\n"
+        "To remove what is inside a box: Select, then Ctrl+I"
     )
     return issued
 
@@ -239,7 +239,7 @@ def _files(preview: Floaters, look: Look) -> list[do.Command]:
     imgui.begin_disabled(preview.recipe.empty)
     if imgui.button(f"{fa.ICON_FA_FLOPPY_DISK}  Save ...##recipe"):
         issued.append(do.ShowDialog(Dialog.SAVE_RECIPE))
-    widgets.tooltip("For other scenes, here and with langflash clean --recipe")
+    widgets.tooltip("To use on other scenes, here or with langflash clean --recipe")
     imgui.end_disabled()
     imgui.same_line()
     if imgui.button(f"{fa.ICON_FA_FOLDER_OPEN}  Load ...##recipe"):

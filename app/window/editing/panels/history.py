@@ -43,7 +43,7 @@ def draw(state: State, look: Look) -> list[do.Command]:
         with widgets.colours(text=theme.ACCENT if position == now else colour):
             chosen = imgui.selectable(f"{icon} {label}##{position}", False)[0]
             if position == 0 and history.forgotten:
-                widgets.tooltip("These stay done: the list holds the last 1,000 edits, or 32 MB of them")
+                widgets.tooltip("No longer undone: the list keeps the last 1,000 edits, or 32 MB of them")
             if chosen and position != now:
                 issued.append(edit.GoTo(position))
         if position == now and _moved(state, now):

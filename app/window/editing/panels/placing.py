@@ -32,11 +32,11 @@ def draw(state: State, look: Look, right: float) -> list[do.Command]:
         chosen, label = editing.handle is handle, f"{icon}##{handle.name}"
         if widgets.primary_button(label) if chosen else imgui.button(label):
             issued.append(placing.SetHandle(handle))
-        widgets.tooltip(f"{tip}\nCtrl snaps, Ctrl + arrows go by steps")
+        widgets.tooltip(f"{tip}\nCtrl snaps, Ctrl+arrows move in steps")
         imgui.same_line()
     imgui.pop_style_var()
     if editing.marks is None or info is None or not editing.marks.selected:
-        said = "Click on a thing to select it"
+        said = "Click a thing to select it"
         widgets.go_on(imgui.calc_text_size(said).x, right)
         imgui.align_text_to_frame_padding()
         imgui.text_colored(theme.MUTED, said)
@@ -63,7 +63,7 @@ def _fields(state: State, pivot: placing.Spot, look: Look, right: float) -> list
         speed = unit * _SPEEDS[editing.handle]
         low, high = SCALES if editing.handle is Handle.SCALE else (0.0, 0.0)
         edited, value = imgui.drag_float(f"##{'xyz'[place]}", number, speed, low, high, digits)
-        widgets.tooltip("Drag it, or double-click and type; all from where the selection is now")
+        widgets.tooltip("Drag, or double-click and type; relative to where the selection is now")
         if edited:
             numbers[place], changed = value, True
     if not changed:
@@ -83,10 +83,10 @@ def draw_tint(state: State, tint: Tint, look: Look, right: float) -> list[do.Com
     imgui.set_next_item_width(look.px(190))
     flags = imgui.ColorEditFlags_.no_inputs | imgui.ColorEditFlags_.no_label
     repainted, colour = imgui.color_edit3("##tint", list(tint.colour), flags)
-    widgets.tooltip("The colour; light and shade stay")
-    text, width = f"{100 * tint.strength:.0f} %", look.px(150)
+    widgets.tooltip("The new colour; light and shade are kept")
+    text, tip, width = f"{100 * tint.strength:.0f} %", "Strength of the colour", look.px(150)
     widgets.go_on(width, right)
-    moved, strength = widgets.slider("##strength", tint.strength, (0.0, 1.0), text, "How much of it", width)
+    moved, strength = widgets.slider("##strength", tint.strength, (0.0, 1.0), text, tip, width)
     widgets.go_on(widgets.button_width("Recolour"), right, look.px(14))
     issued: list[do.Command] = []
     if repainted or moved:
@@ -95,9 +95,9 @@ def draw_tint(state: State, tint: Tint, look: Look, right: float) -> list[do.Com
         issued.append(placing.ShowTint(wanted, placing.luma_of(info, editing.marks)))
     if widgets.primary_button("Recolour"):
         issued.append(placing.EndGesture())
-    widgets.tooltip("Keep it so  (Ctrl+T)")
+    widgets.tooltip("Apply  (Ctrl+T)")
     widgets.go_on(widgets.button_width("Cancel"), right)
     if imgui.button("Cancel##tint"):
         issued.append(placing.EndGesture(keep=False))
-    widgets.tooltip("Leave the colours as they are  (Esc)")
+    widgets.tooltip("Cancel  (Esc)")
     return issued

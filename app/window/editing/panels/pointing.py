@@ -221,7 +221,7 @@ def _going_on(card: Card, look: Look) -> list[do.Command]:
         width = look.px(_CARD - 32) - pin
         if widgets.primary_button(f"{fa.ICON_FA_MAGNIFYING_GLASS}  Find similar", ImVec2(width, 0)):
             issued.append(point.FindSimilar())
-        widgets.tooltip("Ask for everything that says the same as this place")
+        widgets.tooltip("Find everything that looks like this place")
         if pin:
             imgui.same_line(0, look.px(8))
     if card.reading.point is not None:
@@ -231,7 +231,7 @@ def _going_on(card: Card, look: Look) -> list[do.Command]:
         )
         if imgui.button(label, ImVec2(pin - look.px(8) if card.vector else look.px(_CARD - 32), 0)):
             issued.append(tour.AddNote(word or "note", Vector(*card.reading.point), phrase=word))
-        widgets.tooltip("Pin a note of the scene's tour: here, in web pages and in the file")
+        widgets.tooltip("Pin a note here; it is saved in the file and shown in web pages")
     return issued
 
 
@@ -258,11 +258,11 @@ def _group(state: State, card: Card, k: int, look: Look) -> list[do.Command]:
     imgui.separator()
     imgui.push_id(k)
     imgui.set_next_item_width(imgui.get_content_region_avail().x - 2 * look.px(42))
-    hint = "a name of your own"
+    hint = "your own name"
     entered, name = imgui.input_text_with_hint(
         "##name", hint, atom.name, imgui.InputTextFlags_.enter_returns_true
     )
-    widgets.tooltip(f"Call group {k}, {state.editing.atom_name(k)}, otherwise: it answers to that name then")
+    widgets.tooltip(f"Rename group {k}, {state.editing.atom_name(k)}; phrases then find it by that name")
     if entered or (imgui.is_item_deactivated_after_edit() and name != atom.name):
         issued += [edit.RenameAtom(k, name), point.Ask(card.reading.at)]
     imgui.same_line(0, look.px(4))
@@ -270,7 +270,7 @@ def _group(state: State, card: Card, k: int, look: Look) -> list[do.Command]:
     if imgui.button(f"{voice}##voice", ImVec2(look.px(38), 0)):
         issued.append(edit.ToggleAtom(k))
     widgets.tooltip(
-        "This group answers phrases; click to silence it" if atom.on else "Silent; click to let it answer"
+        "This group answers phrases; click to mute it" if atom.on else "Muted; click to let it answer phrases"
     )
     imgui.same_line(0, look.px(4))
     if imgui.button(f"{fa.ICON_FA_DRAW_POLYGON}##group", ImVec2(look.px(38), 0)):

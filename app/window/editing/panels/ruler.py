@@ -59,7 +59,7 @@ def _field(state: State, look: Look, ends: list[ImVec2]) -> list[do.Command]:
         imgui.align_text_to_frame_padding()
         imgui.text(said(length, state.metric, state.guess))
         if state.guess is not None:
-            widgets.tooltip(f"{guess_line(state.guess).capitalize()}; type the true length, and it is none.")
+            widgets.tooltip(f"{guess_line(state.guess).capitalize()}; type the true length to set the scale.")
         imgui.same_line()
         imgui.text_colored(theme.MUTED, "this is")
         imgui.same_line()
@@ -71,7 +71,7 @@ def _field(state: State, look: Look, ends: list[ImVec2]) -> list[do.Command]:
         with suppress(ValueError):
             if (entered or imgui.is_item_deactivated_after_edit()) and text != known:
                 issued.append(point.SetLength(float(text.replace(",", ".")) / 100))
-        widgets.tooltip("How long it is in truth: the scene and its exports are in metres then")
+        widgets.tooltip("The true length; the scene and its exports are then in metres")
         imgui.same_line()
         if widgets.quiet_button(
             f"{fa.ICON_FA_THUMBTACK}##measure", "Keep this measure as a note of the tour"

@@ -23,21 +23,21 @@ _TOOLS = (
     (Tool.BOX, fa.ICON_FA_VECTOR_SQUARE, "Select with a box  (R)\nShift adds, Ctrl removes, Alt orbits"),
     (Tool.LASSO, fa.ICON_FA_SIGNATURE, "Select with a lasso: draw around it, or click its corners  (L)"),
     (Tool.BRUSH, fa.ICON_FA_PAINTBRUSH, "Select with a brush  (B)\n[ and ] change its size"),
-    (Tool.SPHERE, fa.ICON_FA_CIRCLE_DOT, "Select with a ball: press on its middle and pull  (O)"),
+    (Tool.SPHERE, fa.ICON_FA_CIRCLE_DOT, "Select with a ball: drag out from its centre  (O)"),
     (Tool.PICK, fa.ICON_FA_ARROW_POINTER, "Select the thing under a click  (C)"),
     (Tool.PLACE, fa.ICON_FA_CUBE, "Move, turn or scale the selection  (Y, U, I)"),
-    (Tool.CLONE, fa.ICON_FA_STAMP, "Clone brush: copy what is at one place over another  (Ctrl+B)"),
-    (Tool.RULER, fa.ICON_FA_RULER, "Measure, and tell how large things are: click on both ends  (T)"),
+    (Tool.CLONE, fa.ICON_FA_STAMP, "Clone brush: copy one place over another  (Ctrl+B)"),
+    (Tool.RULER, fa.ICON_FA_RULER, "Measure, and set the scale: click both ends  (T)"),
 )
 _COMBINES: tuple[tuple[Combine, str, str], ...] = (
-    ("replace", fa.ICON_FA_SQUARE, "A new selection each time"),
+    ("replace", fa.ICON_FA_SQUARE, "Start a new selection each time"),
     ("add", fa.ICON_FA_PLUS, "Add to the selection  (Shift)"),
-    ("remove", fa.ICON_FA_MINUS, "Take from the selection  (Ctrl)"),
+    ("remove", fa.ICON_FA_MINUS, "Subtract from the selection  (Ctrl)"),
 )
 _WAYS = (
-    ("blur", "Blur", "Colours that run together, of six blocks along its longest side"),
+    ("blur", "Blur", "Blurred colours, six blocks along its longest side"),
     ("pixels", "Pixels", "Blocks of one colour, six along its longest side"),
-    ("remove", "Remove", "Nothing of it; the hole is filled from what is around"),
+    ("remove", "Remove", "Removed; the hole is filled from what is around it"),
 )
 _BUTTON = 36.0  # design pixels of a tool's side
 _SMALLEST = 20.0
@@ -139,7 +139,7 @@ def _strip(state: State, look: Look, wide: float) -> list[do.Command]:
         fa.ICON_FA_WAND_MAGIC_SPARKLES,
         editing.floaters is not None,
         side,
-        "Clean up what does not belong, with a preview; within the selection, if there is one",
+        "Remove floaters and stray bits, with a preview; within the selection, if there is one",
     ):
         issued.append(edit.FindFloaters() if editing.floaters is None else edit.EndFloaters())
     imgui.separator()
@@ -205,19 +205,19 @@ def _cloning(state: State, look: Look, right: float) -> list[do.Command]:
     editing = state.editing
     imgui.align_text_to_frame_padding()
     if editing.source is None:
-        imgui.text("Click on what is to be copied")
+        imgui.text("Click what to copy")
         return []
-    imgui.text("Paint over what it is to cover")
+    imgui.text("Paint where to put it")
     issued: list[do.Command] = []
     widgets.go_on(widgets.button_width(fa.ICON_FA_EYE_DROPPER), right, look.px(14))
     if imgui.button(fa.ICON_FA_EYE_DROPPER):
         issued.append(mending.ForgetSource())
-    widgets.tooltip("Copy another place  (Alt and a click; Alt and a drag turns the view)")
+    widgets.tooltip("Copy from another place  (Alt+click; Alt+drag orbits)")
     label = f"{fa.ICON_FA_UP_RIGHT_AND_DOWN_LEFT_FROM_CENTER}  Fit"
     widgets.go_on(widgets.button_width(label), right)
     if widgets.primary_button(label) if editing.fit else imgui.button(label):
         issued.append(mending.SetFit(not editing.fit))
-    widgets.tooltip("Scale copies until they are as fine as what is there; else they keep their size")
+    widgets.tooltip("Scale copies to match the detail there; otherwise they keep their size")
     return issued + _radius(state, look, right)
 
 
@@ -252,8 +252,8 @@ def _actions(right: float) -> list[do.Command]:
         (fa.ICON_FA_EXPAND, "Fly to it  (F)", point.FrameSelection()),
         (fa.ICON_FA_PALETTE, "Recolour  (Ctrl+T)", placing.BeginTint()),
         (fa.ICON_FA_TRASH, "Delete  (Del)", edit.Delete()),
-        (fa.ICON_FA_CLONE, "Copy it, to be moved over something else  (Ctrl+J)", mending.CopySelection()),
-        (fa.ICON_FA_FILL_DRIP, "Delete, and fill the hole from what is around", mending.FillSelection()),
+        (fa.ICON_FA_CLONE, "Copy it, to place elsewhere  (Ctrl+J)", mending.CopySelection()),
+        (fa.ICON_FA_FILL_DRIP, "Delete, and fill the hole from what is around it", mending.FillSelection()),
         (fa.ICON_FA_USER_SECRET, "Hide for good: blur, pixelate or remove", mending.AskToHide()),
         (fa.ICON_FA_XMARK, "Select nothing  (Ctrl+D)", edit.Deselect()),
     ]
@@ -272,15 +272,15 @@ def _growing(state: State, look: Look) -> list[do.Command]:
     editing = state.editing
     if imgui.button(f"{fa.ICON_FA_MAXIMIZE}  Grow"):
         issued.append(edit.Grow())
-    widgets.tooltip(f"Add everything within {editing.reach:.0f} spacings  (G)")
+    widgets.tooltip(f"Grow by {editing.reach:.0f} step{'s' * (round(editing.reach) != 1)}  (G)")
     active = state.asking.active_prompt
     if active is not None:
         imgui.same_line()
         if imgui.button(fa.ICON_FA_MAGNIFYING_GLASS_PLUS):
             issued.append(edit.Grow(phrase=True))
-        widgets.tooltip(f"Grow, only over what is '{active.text.strip()}'")
+        widgets.tooltip(f"Grow, but only over '{active.text.strip()}'")
     imgui.same_line()
-    tip, width = "How far growing goes, in distances between neighbours", look.px(_REACH)
+    tip, width = "How far to grow, in steps (a step is the distance between neighbours)", look.px(_REACH)
     changed, reach = widgets.slider("##reach", editing.reach, REACH_RANGE, f"{editing.reach:.0f}", tip, width)
     if changed:
         issued.append(point.SetReach(round(reach)))
@@ -295,11 +295,11 @@ def _floaters(state: State, found: Floaters, look: Look, right: float) -> list[d
     imgui.same_line()
     marks = state.editing.marks
     if not found.least or marks is None:
-        imgui.text("Looking for what does not belong ...")
+        imgui.text("Looking for floaters ...")
         return issued
     count = len(found.mask(marks.visible))
-    imgui.text(f"{count:,} to clean up" + (" in the selection" if found.within is not None else ""))
-    tip, width = "Strength: how much is cleaned up", look.px(170)
+    imgui.text(f"{count:,} to remove" + (" in the selection" if found.within is not None else ""))
+    tip, width = "Strength: how much is removed", look.px(170)
     widgets.go_on(width, right, look.px(14))
     text = f"{100 * found.strength:.0f} %"
     changed, strength = widgets.slider("##strength", found.strength, (0.0, 1.0), text, tip, width)
@@ -325,17 +325,17 @@ def _hiding(state: State, asked: Hiding, look: Look, right: float) -> list[do.Co
     widgets.go_on(widgets.button_width("Hide it"), right, look.px(14))
     if widgets.primary_button("Hide it##for good"):
         issued.append(mending.HideForGood(asked.how, asked.margin))
-    widgets.tooltip("It can be brought back until the scene is saved, and never from the file")
+    widgets.tooltip("You can undo this until the scene is saved; the saved file no longer holds it")
     widgets.go_on(widgets.button_width("Cancel"), right)
     if imgui.button("Cancel##hiding"):
         issued.append(mending.AskToHide(""))
-    widgets.tooltip("Leave all as it is  (Esc)")
+    widgets.tooltip("Cancel  (Esc)")
     return issued
 
 
 def _margin(state: State, asked: Hiding, look: Look, right: float) -> list[do.Command]:
     """How much around the selection is hidden with it, and how many Gaussians that are."""
-    tip = "Margin: hidden with it, of a photo's longer side, so that no rim of it is left"
+    tip = "Margin: how much around it is hidden too, as a share of a photo's longer side"
     name, text = "Margin", f"{100 * asked.margin:.1f} %"
     beside = imgui.calc_text_size(f"{name}{100 * MOST_MARGIN:.1f} %").x + 2 * imgui.get_style().item_spacing.x
     widgets.go_on(look.px(_MARGIN_SLIDER) + beside, right, look.px(14))
@@ -361,7 +361,7 @@ def _end_floaters(count: int, opened: bool, look: Look, right: float) -> list[do
     widgets.go_on(widgets.button_width(label), right, look.px(14))
     if widgets.primary_button(label) if opened else imgui.button(label):
         issued.append(clean.ShowRules(not opened))
-    widgets.tooltip("By sureness, size, opacity, colour, distance, photos; a box; recipes")
+    widgets.tooltip("By certainty, size, opacity, colour, distance or photos; by a box; by recipes")
     widgets.go_on(widgets.button_width("Delete"), right, look.px(14))
     imgui.begin_disabled(count == 0)
     if widgets.primary_button("Delete##floaters"):
@@ -373,7 +373,7 @@ def _end_floaters(count: int, opened: bool, look: Look, right: float) -> list[do
     widgets.go_on(widgets.button_width("Cancel"), right)
     if imgui.button("Cancel##floaters"):
         issued.append(edit.EndFloaters())
-    widgets.tooltip("Leave all as it is  (Esc)")
+    widgets.tooltip("Cancel  (Esc)")
     return issued
 
 

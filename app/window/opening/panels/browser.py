@@ -20,9 +20,9 @@ from ..state import Folder, small
 WIDTH = 760.0  # design pixels
 _HEIGHT, _CELL = 330.0, 132.0
 _HINTS = {
-    Dialog.OPEN: "a scene, a photo, a film or a folder; or choose below",
-    Dialog.MERGE: "a scene or a folder; or choose below",
-    Dialog.PLACE: "a folder; or walk to it below",
+    Dialog.OPEN: "type a scene, photo, film or folder, or choose below",
+    Dialog.MERGE: "type a scene or a folder, or choose below",
+    Dialog.PLACE: "type a folder, or choose one below",
 }
 
 
@@ -52,7 +52,7 @@ def _path(state: State) -> tuple[list[do.Command], bool]:
         imgui.set_keyboard_focus_here()
     hint = _HINTS[state.dialog or Dialog.OPEN]
     changed, path = imgui.input_text_with_hint("##path", hint, state.typed.text)
-    confirmed = imgui.is_item_deactivated() and imgui.is_key_pressed(imgui.Key.enter)
+    confirmed = widgets.confirmed()
     return ([do.EditDialogPath(path)] if changed else []), confirmed
 
 
@@ -61,7 +61,7 @@ def _way(folder: Folder, look: Look) -> list[do.Command]:
     issued: list[do.Command] = []
     if imgui.button(f"{fa.ICON_FA_ARROW_UP}##up"):
         issued.append(opening.LookInto(folder.path.parent))
-    widgets.tooltip("The folder around this one")
+    widgets.tooltip("Parent folder")
     imgui.same_line(0, look.px(4))
     if imgui.button(f"{fa.ICON_FA_HOUSE}##home"):
         issued.append(opening.LookInto(Path.home()))
@@ -94,13 +94,11 @@ def _inside(state: State, folder: Folder, look: Look) -> list[do.Command]:
             imgui.same_line(0, gap)
         issued += _photo(state, path, ImVec2(room / columns - gap, look.px(_CELL)), look)
     if folder.left_out:
-        widgets.muted(f"and {folder.left_out} more; type the path of one of those")
+        widgets.muted(f"and {folder.left_out} more; type a path to open one of them")
     if folder.unsaid:
-        widgets.muted(f"and {folder.unsaid} whose names are not UTF-8; rename those")
+        widgets.muted(f"and {folder.unsaid} with names that are not UTF-8; rename them")
     if not (folder.folders or photos or films or scenes or folder.problem):
-        widgets.muted(
-            "No folder lies here." if state.dialog is Dialog.PLACE else "Nothing to open lies here."
-        )
+        widgets.muted("No folders here." if state.dialog is Dialog.PLACE else "Nothing to open here.")
     return issued
 
 
@@ -139,11 +137,7 @@ def _photo(state: State, path: Path, size: ImVec2, look: Look) -> list[do.Comman
 def _taken(state: State, path: Path) -> do.Command:
     """What a press on a file comes to: Enter opens it and what is chosen, the space bar and the mouse take it
     with the others."""
-    return _opened(state, (*state.opening.chosen, path)) if _enters() else opening.Choose(path)
-
-
-def _enters() -> bool:
-    return any(map(imgui.is_key_pressed, (imgui.Key.enter, imgui.Key.keypad_enter)))
+    return _opened(state, (*state.opening.chosen, path)) if widgets.enters() else opening.Choose(path)
 
 
 def _opened(state: State, paths: tuple[Path, ...]) -> do.Command:
@@ -165,21 +159,21 @@ def _buttons(state: State, confirmed: bool, look: Look) -> list[do.Command]:
     count, merging = len(chosen), state.dialog is Dialog.MERGE
     label = "Merge" if merging else "Open" if typed or count < 2 else f"Open {count} files"
     imgui.begin_disabled(not typed and not chosen)
-    pressed = widgets.primary_button(f"{label}###open", look.vec(140, 0))
+    pressed = widgets.default_button(f"{label}###open", look.vec(140, 0), confirmed)
     imgui.end_disabled()
     imgui.same_line()
     if imgui.button("Cancel", look.vec(110, 0)):
         issued.append(do.ShowDialog(None))
-    told = "Enter merges it" if merging else "The space bar takes several, Enter opens"
+    told = "Enter merges" if merging else "Space selects several, Enter opens"
     widgets.beside(imgui.calc_text_size(told).x, look.px(14))
     imgui.align_text_to_frame_padding()
     imgui.text_colored(theme.MUTED, told)
-    if typed and (pressed or confirmed):
+    if typed and pressed:
         path = typed_path(typed)
-        walks = confirmed and not pressed and state.typed.there is There.FOLDER and typed.endswith(os.sep)
+        walks = confirmed and state.typed.there is There.FOLDER and typed.endswith(os.sep)
         merge_or_open = show.MergeScene(path) if merging else show.OpenPaths((str(path),))
         issued.append(opening.LookInto(path) if walks else merge_or_open)
-    elif chosen and (pressed or confirmed):
+    elif chosen and pressed:
         issued.append(_opened(state, chosen))
     return issued
 
@@ -188,13 +182,13 @@ def _place_buttons(state: State, confirmed: bool, look: Look) -> list[do.Command
     """Of the dialog for a folder to write to: the one that was typed, or the one on show."""
     folder, typed = state.opening.folder, state.typed.text.strip()
     imgui.begin_disabled(folder is None or bool(folder.problem and not typed))
-    pressed = widgets.primary_button("Write here", look.vec(140, 0))
+    pressed = widgets.default_button("Write here", look.vec(140, 0), confirmed)
     imgui.end_disabled()
     imgui.same_line()
     if imgui.button("Back", look.vec(110, 0)):
         return [opening.PlaceFound(None)]
     if typed and confirmed:
         return [opening.LookInto(typed_path(typed))]
-    if (pressed or confirmed) and folder is not None:
+    if pressed and folder is not None:
         return [opening.PlaceFound(typed_path(typed) if typed else folder.path)]
     return []

@@ -15,7 +15,7 @@ from ..state import Film, small
 
 WIDTH = 860.0  # design pixels
 _HEIGHT, _CELL = 372.0, 116.0
-_WHY_NOT = {REPEAT: "shows what another one shows", ELSEWHERE: "of another place"}
+_WHY_NOT = {REPEAT: "shows the same as another frame", ELSEWHERE: "shows another place"}
 
 
 def draw(state: State, look: Look) -> list[do.Command]:
@@ -54,8 +54,8 @@ def _number(state: State, film: Film, look: Look) -> list[do.Command]:
     name = widgets.shortened(film.strip.film, look.px(380))
     imgui.text(f"{name}: {count} frame{'s' * (count != 1)} of {film.strip.seconds:.1f} seconds")
     for icon, wanted, tip in (
-        (fa.ICON_FA_MINUS, count - 1, "Choose anew, one less"),
-        (fa.ICON_FA_PLUS, count + 1, "Choose anew, one more"),
+        (fa.ICON_FA_MINUS, count - 1, "One frame fewer, chosen again"),
+        (fa.ICON_FA_PLUS, count + 1, "One frame more, chosen again"),
     ):
         imgui.same_line()
         imgui.begin_disabled(not 2 <= wanted <= most)
@@ -64,7 +64,8 @@ def _number(state: State, film: Film, look: Look) -> list[do.Command]:
         imgui.end_disabled()
         widgets.tooltip(tip)
     imgui.same_line()
-    if widgets.quiet_button("As proposed", "The sharpest ones, evenly along the way of the camera"):
+    tip = "The sharpest frames, spread evenly along the camera's path"
+    if widgets.quiet_button("Reset to suggested", tip):
         issued.append(opening.ProposeFrames(min(most, FILM_PHOTOS)))
     return issued
 
@@ -102,7 +103,7 @@ def _card(film: Film, index: int, still: Still, size: ImVec2, look: Look) -> lis
 def _buttons(film: Film, look: Look) -> list[do.Command]:
     issued: list[do.Command] = []
     imgui.begin_disabled(not film.chosen)
-    if widgets.primary_button(f"{fa.ICON_FA_CUBES}  Reconstruct", look.vec(150, 0)):
+    if widgets.default_button(f"{fa.ICON_FA_CUBES}  Reconstruct", look.vec(150, 0)):
         issued.append(opening.TakeFrames())
     imgui.end_disabled()
     imgui.same_line()
@@ -110,5 +111,5 @@ def _buttons(film: Film, look: Look) -> list[do.Command]:
         issued.append(do.ShowDialog(None))
     imgui.same_line(0, look.px(14))
     imgui.align_text_to_frame_padding()
-    imgui.text_colored(theme.MUTED, "A click takes a frame in or out")
+    imgui.text_colored(theme.MUTED, "Click a frame to include or exclude it")
     return issued

@@ -174,7 +174,7 @@ def _projects(rows: list[tuple[Project, ...]], at: ImVec2, look: Look) -> list[d
     """A tile each, the middle of the first row at `at`."""
     issued: list[do.Command] = []
     gap, (width, height) = look.px(8), (look.px(side) for side in _TILE)
-    _line("or go on where you were", ImVec2(at.x, at.y - look.px(8)))
+    _line("or continue where you left off", ImVec2(at.x, at.y - look.px(8)))
     for row, projects in enumerate(rows):
         left = at.x - (len(projects) * (width + gap) - gap) / 2
         top = at.y + row * (height + look.px(_CAPTION))
@@ -203,7 +203,7 @@ def _project(project: Project, corner: ImVec2, look: Look) -> list[do.Command]:
         place = ImVec2(corner.x, below + (line + 1) * look.px(18))
         canvas.add_text(place, widgets.u32(theme.MUTED), widgets.shortened(text, size.x))
     imgui.set_cursor_screen_pos(ImVec2(corner.x + size.x - side, below - look.px(6)))
-    if widgets.quiet_button(f"{fa.ICON_FA_XMARK}##forget {project.path}", "Forget it here  (Delete)"):
+    if widgets.quiet_button(f"{fa.ICON_FA_XMARK}##forget {project.path}", "Remove from this list  (Delete)"):
         issued.append(keep.ForgetRecent(project.path))
     return issued
 

@@ -79,7 +79,7 @@ def _rays(state: State, side: float) -> list[do.Command]:
         pressed = imgui.button(f"{icon}##rays", ImVec2(side, side))
     imgui.pop_style_var()
     now, other = ("Parallel rays", "perspective") if flat else ("Perspective", "parallel rays")
-    widgets.tooltip(f"{now}; a click for {other}  (,)")
+    widgets.tooltip(f"{now}; click for {other}  (,)")
     return [camera.SwitchRays()] if pressed else []
 
 

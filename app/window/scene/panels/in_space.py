@@ -130,7 +130,7 @@ def _frusta(state: State, look: Look, corner: ImVec2, size: ImVec2) -> list[do.C
             canvas.add_image_quad(picture[0], a, b, c, d, *corners, col=tint)
         canvas.add_quad(a, b, c, d, colour, look.px(2.2 if over else 1.2))
         if over:
-            imgui.set_tooltip(f"Stand where photo {view + 1} was taken")
+            imgui.set_tooltip(f"Go to where photo {view + 1} was taken")
             if imgui.is_mouse_clicked(0):
                 issued.append(camera.JumpTo(view))
     return issued

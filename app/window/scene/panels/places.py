@@ -42,7 +42,7 @@ def draw(state: State, look: Look, size: ImVec2) -> list[do.Command]:
         return []
     if imgui.button(f"{fa.ICON_FA_MAP_LOCATION_DOT}###places", size):
         imgui.open_popup(_POPUP)
-    widgets.tooltip("The photos by place, and what was left out")
+    widgets.tooltip("Map of the photos, with any left out")
     corner, extent = imgui.get_item_rect_min(), _extent(info, look)
     right = imgui.get_main_viewport().size.x - extent.x - 2 * imgui.get_style().window_padding.x
     above = ImVec2(max(min(corner.x, right), 0.0), corner.y - look.px(6))
@@ -62,11 +62,11 @@ def left_out(info: SceneInfo) -> list[str]:
     if names:
         more = f" and {len(names) - _NAMED} more" if len(names) > _NAMED else ""
         who = ", ".join(shown_name(name) for name in names[:_NAMED]) + more
-        said.append(f"Not placed, too little of it is on other photos: {who}.")
+        said.append(f"Could not be placed, too little overlap with other photos: {who}.")
     some = sum(share > 0 for share in _shares(info))
     if some:
         whose = "1 photo" if some == 1 else f"{some} photos"
-        said.append(f"Parts of {whose} (ringed) are left out, the others show something else there.")
+        said.append(f"Parts of {whose} (ringed) were left out: other photos show something else there.")
     return [*said, *film_sentences(told)]
 
 

@@ -58,14 +58,14 @@ def draw_drop(state: State, look: Look) -> list[do.Command]:
     if imgui.button("Add to this room", look.vec(160, 0)):
         issued.append(show.dropped(state, state.scene.dropped, new=False))
     imgui.end_disabled()
-    known = "Reconstruct it from the photos in the tray and these"
+    known = "Reconstruct from the photos in the tray plus these"
     widgets.tooltip(
         known if state.scene.photos else "This room came from a file; its photos are not in the tray"
     )
     widgets.beside(look.px(130))
-    if widgets.primary_button("New room", look.vec(130, 0)):
+    if widgets.default_button("New room", look.vec(130, 0)):
         issued.append(show.dropped(state, state.scene.dropped, new=True))
-    widgets.tooltip("Of these photos alone; the present room stays one click away")
+    widgets.tooltip("From these photos only; the current room stays one click away")
     widgets.beside(look.px(110))
     if imgui.button("Cancel", look.vec(110, 0)):
         issued.append(do.ShowDialog(None))
@@ -82,13 +82,13 @@ def draw_scene_drop(state: State, look: Look) -> list[do.Command]:
     widgets.muted(f"{state.scene.info.name} is open.")
     widgets.gap(look.px(4))
     issued: list[do.Command] = []
-    if widgets.primary_button("Open it", look.vec(130, 0)):
+    if widgets.default_button("Open it", look.vec(130, 0)):
         issued.append(show.Instead((show.OpenScene(path, alone=True),)))
-    widgets.tooltip("The present scene stays one click away")
+    widgets.tooltip("The current scene stays one click away")
     widgets.beside(look.px(190))
     if imgui.button("Merge into this scene", look.vec(190, 0)):
         issued.append(show.MergeScene(path))
-    widgets.tooltip("Beside what is there, to be put in its place; Ctrl+Z undoes")
+    widgets.tooltip("Added beside the scene, ready to be moved; Ctrl+Z undoes")
     widgets.beside(look.px(110))
     if imgui.button("Cancel", look.vec(110, 0)):
         issued.append(do.ShowDialog(None))
@@ -100,10 +100,10 @@ def draw_unsaved(state: State, look: Look) -> list[do.Command]:
     name = "" if state.scene.info is None else state.scene.info.name
     imgui.text_wrapped(f"The edits of {name} are not saved.")
     with widgets.colours(text=theme.MUTED):
-        imgui.text_wrapped("Discarded ones can be had back for a while: the room stays in the list of rooms.")
+        imgui.text_wrapped("Discarded edits can be had back for a while, from the list of rooms.")
     widgets.gap(look.px(4))
     issued: list[do.Command] = []
-    if widgets.primary_button("Save ...", look.vec(120, 0)):
+    if widgets.default_button("Save ...", look.vec(120, 0)):
         issued.append(show.SaveFirst())
     widgets.beside(look.px(120))
     if imgui.button("Discard", look.vec(120, 0)):

@@ -24,11 +24,11 @@ from . import rooms, stages
 COLUMNS, MORE = 3, 5  # photos side by side; the second where there are over 12
 _CANCEL = 104.0  # design pixels
 NOTABLE_SECONDS = 0.05  # of a finished stage; a shorter one is only a heading of others
-HOW_TO_TELL = "click a photo to tell it"
-WITHOUT_PHOTOS = "open the photos to tell it"
+HOW_TO_TELL = "click a photo to set it"
+WITHOUT_PHOTOS = "open the photos to set it"
 _DRAGGED = "photo"  # what a card is called while it is dragged
 
-ONE_PHOTO = "depth is a guess from one photo; a second one from a step aside measures it"
+ONE_PHOTO = "depth is guessed from one photo; add a second one, taken a step aside, to measure it"
 
 
 def draw(state: State, look: Look) -> list[do.Command]:
@@ -76,8 +76,11 @@ def sentences(said: Iterable[str], how: str = HOW_TO_TELL) -> list[str]:
 
 
 def said_here(text: str, how: str = HOW_TO_TELL) -> str:
-    """A warning as a sentence; what the core says of its command line in the window's words."""
-    return widgets.sentence(text.replace("on the command line, --fov tells it", how))
+    """A warning as a sentence; what the core says of its command line in the window's words, also as files
+    of before have it."""
+    for told in ("set it with --fov", "on the command line, --fov tells it"):
+        text = text.replace(told, how)
+    return widgets.sentence(text)
 
 
 def _hint(look: Look) -> None:
@@ -151,7 +154,7 @@ def _card(look: Look, photo: Photo, found: FoundLens | None, size: ImVec2, open_
     imgui.invisible_button("card", size)
     hovered = imgui.is_item_hovered()
     if imgui.is_item_hovered(imgui.HoveredFlags_.for_tooltip):
-        imgui.set_tooltip(f"{shown_name(photo.path.name)}\nClick for its lens, drag to put it elsewhere")
+        imgui.set_tooltip(f"{shown_name(photo.path.name)}\nClick to set its lens, drag to reorder")
     picture = look.thumbnails.get(str(photo.path))
     canvas.add_rect_filled(corner, end, widgets.u32(theme.RAISED), look.px(6))
     if picture is not None:
@@ -209,7 +212,7 @@ def _source(photo: Photo, found: FoundLens | None) -> str:
         return "your own"
     if found is not None:
         return f"found from the photos, ± {found.error:.1f}"
-    return "from the file" if photo.recorded else "assumed: the file does not say"
+    return "from the file" if photo.recorded else "assumed, the file does not say"
 
 
 def _details(state: State, index: int, photo: Photo, found: FoundLens | None, look: Look) -> list[do.Command]:
@@ -225,8 +228,8 @@ def _details(state: State, index: int, photo: Photo, found: FoundLens | None, lo
     if changed:
         issued.append(show.SetPhotoFov(index, fov))
     imgui.begin_disabled(photo.fov is None)
-    untold = "As recorded" if photo.recorded else "Assume again"
-    if imgui.button(f"{fa.ICON_FA_ROTATE_LEFT}  {untold if found is None else 'As found'}"):
+    untold = "Use the recorded one" if photo.recorded else "Use the default"
+    if imgui.button(f"{fa.ICON_FA_ROTATE_LEFT}  {untold if found is None else 'Use the one found'}"):
         issued.append(show.SetPhotoFov(index, None))
     imgui.end_disabled()
     issued += _order(state, index)
@@ -234,7 +237,7 @@ def _details(state: State, index: int, photo: Photo, found: FoundLens | None, lo
     if imgui.button(fa.ICON_FA_TRASH):
         issued.append(show.RemovePhoto(index))
         imgui.close_current_popup()
-    widgets.tooltip("Take it out of the tray")
+    widgets.tooltip("Remove from the tray")
     for note in photo.notes:
         _warning(said_here(note))
     imgui.end_popup()
@@ -245,8 +248,8 @@ def _order(state: State, index: int) -> list[do.Command]:
     """Two arrows that take a photo one place earlier or later."""
     issued: list[do.Command] = []
     for label, place, tip in (
-        (fa.ICON_FA_ARROW_LEFT, index - 1, "Earlier; the first photo's camera becomes the world"),
-        (fa.ICON_FA_ARROW_RIGHT, index + 1, "Later"),
+        (fa.ICON_FA_ARROW_LEFT, index - 1, "Move earlier; the first photo sets the scene's axes"),
+        (fa.ICON_FA_ARROW_RIGHT, index + 1, "Move later"),
     ):
         imgui.same_line()
         imgui.begin_disabled(not 0 <= place < len(state.scene.photos))
@@ -300,7 +303,7 @@ def _buttons(state: State, look: Look) -> list[do.Command]:
     if widgets.primary_button(f"{label}###reconstruct", ImVec2(width, 0)):
         issued.append(show.Instead((show.Reconstruct(),)))
     if goes_on:
-        widgets.tooltip("Go on from what was kept of these photos")
+        widgets.tooltip("Continue from the saved progress")
     if _icons(state)[0]:
         imgui.same_line()
         icon = fa.ICON_FA_HOURGLASS_HALF if state.scene.choosing else fa.ICON_FA_FILTER
@@ -323,12 +326,12 @@ def _progress(job: Job, now: float, look: Look) -> list[do.Command]:
     imgui.begin_disabled(job.cancelling)
     if imgui.button(f"{fa.ICON_FA_STOP}  Cancel", look.vec(_CANCEL, 0)):
         issued.append(show.CancelJob())
-    widgets.tooltip("Stop it  (Esc)")
+    widgets.tooltip("Stop  (Esc)")
     imgui.same_line()
     if job.pausable:
         if imgui.button(f"{fa.ICON_FA_PAUSE}##pause", ImVec2(_side(look), 0)):
             issued.append(show.PauseJob())
-        widgets.tooltip("Pause it: what is done stays, also when the program ends")
+        widgets.tooltip("Pause: progress is kept, even if you quit")
         imgui.same_line()
     imgui.end_disabled()
     corner, width = imgui.get_cursor_screen_pos(), imgui.get_content_region_avail().x

@@ -48,9 +48,7 @@ def draw(state: State, look: Look) -> list[do.Command]:
                 imgui.push_style_var(imgui.StyleVar_.frame_padding, look.vec(3, 3))
                 pressed = imgui.image_button("view", picture[0], ImVec2(round(height * picture[1]), height))
                 imgui.pop_style_var()
-        widgets.tooltip(
-            f"Stand where photo {view + 1} was taken" + ("; the wheel shows others" if scrolls else "")
-        )
+        widgets.tooltip(f"Go to where photo {view + 1} was taken" + ("; scroll for more" if scrolls else ""))
         if pressed:
             issued.append(camera.JumpTo(view))
         imgui.pop_id()
@@ -61,7 +59,7 @@ def draw(state: State, look: Look) -> list[do.Command]:
     imgui.same_line(0, look.px(4))
     if imgui.button(fa.ICON_FA_VIDEO, look.vec(34, _VIEW + 6)):
         issued.append(film.AddKey())
-    widgets.tooltip("Begin a film, or go on with it: the present view as a key frame  (M)")
+    widgets.tooltip("Add this view as a key frame  (M)")
     if places.offered(state.scene.info):
         imgui.same_line(0, look.px(4))
         issued += places.draw(state, look, look.vec(34, _VIEW + 6))
@@ -86,7 +84,7 @@ def _in_space(state: State, look: Look) -> list[do.Command]:
     if _switch(fa.ICON_FA_LEFT_RIGHT, in_space.comparing(state), size):
         issued.append(camera.Compare(None if in_space.comparing(state) else 0.5))
     imgui.end_disabled()
-    widgets.tooltip("Compare with the photo, at a photo's own view  (P)")
+    widgets.tooltip("Compare with the photo, when standing at one  (P)")
     if _switch(fa.ICON_FA_CAMERA, wanted.photos_in_space, size):
         issued.append(keep.Prefer(replace(wanted, photos_in_space=not wanted.photos_in_space)))
     widgets.tooltip("Show the photos' cameras in the scene  (K)")

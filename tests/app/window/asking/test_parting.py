@@ -96,7 +96,7 @@ def test_taking_a_part_out_leaves_the_others_and_all_that_is_written_follows(
     assert (chairs(listed), chairs(less)) == (2, 1)
     history, info = less.editing.history, less.scene.info
     assert history is not None and info is not None and less.editing.unsaved
-    assert history.done[-1].label == "Take a part out of chair"
+    assert history.done[-1].label == "Remove a part of chair"
     list(WriteScene(info.scene, tmp_path / "s.langflash", less.editing.marks).run(lambda: False))
     written = load(tmp_path / "s.langflash")
     assert segment(written, ["chair"], threshold=CUT).counts == (1,)
@@ -145,7 +145,7 @@ def test_what_has_no_parts_is_said_or_left_alone(listed: State) -> None:
     assert after(other, stale).asking.parts == other.asking.parts
     moved = after(listed, edit.SelectAll(), edit.Delete())
     merged = Merged(1, (1, 1), listed.scene.info, "room", Mask.none(3), denied="chair")  # type: ignore[arg-type]
-    assert not merged.fits(moved) and "Nothing was taken out" in told(after(moved, merged))
+    assert not merged.fits(moved) and "Nothing was removed" in told(after(moved, merged))
     assert after(listed, Answered(())).asking.parts is not None
 
 

@@ -124,7 +124,7 @@ def test_one_photo_is_told_to_leave_depth_a_guess() -> None:
     state = shown_scene()
     assert state.scene.info is not None
     one = state.with_scene(info=replace(state.scene.info, views=state.scene.info.views[:1]))
-    told = [sentence for sentence in tray._sentences(one) if "depth is a guess" in sentence.lower()]
+    told = [sentence for sentence in tray._sentences(one) if "depth is guessed" in sentence.lower()]
     assert len(told) == 1
     assert not any("guess" in sentence.lower() for sentence in tray._sentences(state))
 
@@ -132,8 +132,10 @@ def test_one_photo_is_told_to_leave_depth_a_guess() -> None:
 def test_the_lens_is_told_by_photos_that_are_there() -> None:
     state = shown_scene()
     assert state.scene.info is not None
-    said = "assumed field of view 65 degrees; on the command line, --fov tells it"
+    said = "the photos do not record their lens, a field of view of 65° is assumed; set it with --fov"
     state = state.with_scene(info=replace(state.scene.info, warnings=(said,)), photos=())
     assert tray.WITHOUT_PHOTOS in tray._sentences(state)[0] and "--fov" not in tray._sentences(state)[0]
+    before = "assumed field of view 65 degrees; on the command line, --fov tells it"  # in files of before
+    assert tray.said_here(before).endswith(f"{tray.HOW_TO_TELL}.")
     beside = state.with_scene(photos=(Photo(Path("a.jpg")),))
     assert tray.HOW_TO_TELL in tray._sentences(beside)[0]

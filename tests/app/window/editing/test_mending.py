@@ -292,7 +292,7 @@ def test_what_was_edited_meanwhile_is_not_lost(desk: Desk) -> None:
     desk.perform(edit.Delete())
     desk.work()
     assert desk.state.scene.info is not None and desk.state.scene.info.serial == 1
-    assert any("edited meanwhile" in toast.text for toast in desk.state.toasts)
+    assert any("edited in the meantime" in toast.text for toast in desk.state.toasts)
 
 
 def test_without_a_selection_nothing_happens(desk: Desk) -> None:

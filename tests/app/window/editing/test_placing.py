@@ -112,7 +112,7 @@ def test_keys_move_turn_and_scale_by_steps_as_the_picture_shows_it(chosen: State
     np.testing.assert_allclose(change.turn, turn_about((0, -1, 0), 10.0), atol=1e-12)
     larger = after(chosen, SetHandle(Handle.SCALE), Nudge(down=-1))
     assert np.ptp(means(larger)[:2500, 0]) == pytest.approx(1.05 * np.ptp(before[:, 0]), rel=1e-5)
-    entry = table.named("Gizmo: a step left")
+    entry = table.named("Nudge the selection: left")
     assert entry.key == "Ctrl+Left" and entry.make(chosen) == Nudge(right=-1)
     assert entry.make(after(chosen, point.SetTool(Tool.MOVE))) is None
 

@@ -52,7 +52,7 @@ def test_names_that_are_kept_in_one_room_are_taken_in_another_and_undone(tmp_pat
 def test_nothing_to_keep_or_to_take_is_said(tmp_path):
     path, state = tmp_path / teaching.WORDS, opened(0, 1)
     assert "Name a group first" in told(run(state, work.KeepLessons(*errand(state), path)))
-    assert "Nothing is kept yet" in told(run(state, work.FindLessons(*errand(state), path)))
+    assert "Nothing is saved yet" in told(run(state, work.FindLessons(*errand(state), path)))
     assert "No group here" in told(apply(state, teaching.WordsFound(())))
     path.write_text("{")
     with pytest.raises(PromptError, match="no usable vocabulary"):

@@ -48,7 +48,7 @@ def test_every_kind_says_the_command_that_does_it(what: Output) -> None:
         f"/out/a picture{what.suffix}",
     ]
     asked = what.needs_phrases or what is outputs.PAGE  # a page shows the phrases as asked
-    assert ("--prompt" in words) == asked and ("--view" in words) == what.looks
+    assert ("--prompt" in words) == asked and ("--camera" in words) == what.looks
     assert ("--size" in words) == what.sized and ("--seconds" in words) == what.moves
     assert ("--segmented" in words) == (what is outputs.SEGMENTED)
 
@@ -127,18 +127,30 @@ def test_what_is_missing_is_said() -> None:
     assert "is the scene itself" in wrong(form(scene(), what=outputs.SCENE, path="/rooms/my room"))
     silent = after(scene(), ask.EditPrompt(0, ""))
     assert "needs a phrase" in wrong(form(silent, what=outputs.MASK, path="/x"))
-    assert "no phrase to keep" in wrong(form(silent, what=outputs.PLY, only_found=True, path="/x"))
+    assert "no phrase to export" in wrong(form(silent, what=outputs.PLY, only_found=True, path="/x"))
     assert "save it first" in wrong(form(scene(None), path="/x"))
 
 
-def test_the_view_on_show_a_camera_of_its_own_or_all_photos() -> None:
+def test_the_view_on_show_or_all_photos() -> None:
     state = form(after(scene(), camera.JumpTo(1)), path="/out/x.png")
     order = export_form.order(state)
-    assert not isinstance(order, str) and order.words[order.words.index("--view") + 1] == "1"
+    assert not isinstance(order, str) and order.camera_file == Path("/out/x.camera.json")
     moved = export_form.order(after(state, camera.MoveTo(Pose(Vector(0.0, 0.0, -1.0)))))
     assert not isinstance(moved, str) and moved.camera_file == Path("/out/x.camera.json")
     every = export_form.order(form(state, all_views=True))
     assert not isinstance(every, str) and "--all-views" in every.words and every.camera_file is None
+
+
+def test_the_view_on_show_has_the_shape_of_the_window() -> None:
+    """It had that of a photo, and what the window shows beside it was cut off."""
+    state = form(scene(), side=1024, path="/out/x.png")
+    assert state.scene.pose.aspect == pytest.approx(4 / 3)
+    wide = replace(state, stats=replace(state.stats, picture_size=(1200, 600)))
+    order = export_form.order(wide)
+    assert not isinstance(order, str) and order.request.size == (1024, 512)
+    every, undrawn = export_form.order(form(wide, all_views=True)), export_form.order(state)
+    assert not isinstance(every, str) and not isinstance(undrawn, str)
+    assert every.request.size == undrawn.request.size == (1024, 768)  # of photos; before the first picture
 
 
 def test_an_unsaved_scene_is_read_from_its_copy() -> None:
@@ -215,11 +227,11 @@ def test_no_two_kinds_write_the_same_file(all_views: bool, moved: bool) -> None:
 
 def test_what_a_kind_writes_beside_its_file() -> None:
     state = form(scene(), what=outputs.LABELS, path="/x/a.png")
-    assert written(state) == {Path("/x/a.png"), Path("/x/a.json")}
+    assert written(state) == {Path("/x/a.png"), Path("/x/a.json"), Path("/x/a.camera.json")}
     every = form(state, all_views=True)
-    assert written(every) == {Path(f"/x/a_{n}.{kind}") for n in (0, 1) for kind in ("png", "json")}
+    assert written(every) == {Path(f"/x/a_{n}.{kind}") for n in (1, 2) for kind in ("png", "json")}
     coco = form(scene(), what=outputs.COCO, path="/x/a.json")
-    assert written(coco) == {Path("/x/a.json"), Path("/x/a_0.png")}
+    assert written(coco) == {Path("/x/a.json"), Path("/x/a_1.png"), Path("/x/a.camera.json")}
     ply = form(scene(), what=outputs.PLY, path="/x/a.ply")
     assert written(ply) == {Path("/x/a.ply"), Path("/x/a.language.safetensors")}
 
@@ -280,7 +292,7 @@ def test_it_is_asked_before_a_file_is_replaced(monkeypatch, folders: Path) -> No
     (folders / "a.json").write_text("boxes")  # where the legend would go
     desk.perform(export.Export())
     assert len(desk.ran) == 1 and desk.state.dialog is Dialog.REPLACE
-    assert desk.state.exporting.there == (folders / "a.json",)
+    assert desk.state.exporting.there == (folders / "a.json", folders / "a.camera.json")
     desk.perform(do.ShowDialog(Dialog.EXPORT))
     assert desk.state.exporting.form.path == str(folders / "a.png")
     desk.perform(export.Export(sure=True))

@@ -99,7 +99,9 @@ def test_help_fits_a_window_of_800_lines() -> None:
     assert ("Ctrl+Z", "Undo") in dialogs.help_rows("Edit")
     assert ("Comma, Num 5", "Parallel rays (orthographic), or perspective") in dialogs.help_rows("View")
     turns = [keys for keys, meaning in dialogs.help_rows("View") if meaning.startswith("Orbit")]
-    assert turns == ["Num 4 to Num 2", "Ctrl+Shift+Left to Ctrl+Shift+Down"], "each kind of key its row"
+    assert turns == ["Num 4, 6, 8, 2", "Ctrl+Shift+arrows"], "each kind of key its row"
+    assert ("PgDn, PgUp", "Tour: next stop, previous stop") in dialogs.help_rows("View")
+    assert ("Ctrl+arrows, PgUp, PgDn", "Nudge the selection") in dialogs.help_rows("Edit")
 
 
 @pytest.mark.parametrize("scale", [1.0, 1.5])

@@ -180,8 +180,8 @@ def test_a_scene_that_is_not_opened_is_said(tmp_path: Path, walk: Path) -> None:
         path.touch()
     for given, said in (
         (scenes, "Only a.ply was opened"),
-        ([scenes[1], photo], "b.langflash was not opened, for photos came with it"),
-        ([scenes[1], walk], "b.langflash was not opened, for a film came with it"),
+        ([scenes[1], photo], "b.langflash was not opened, since photos came with it"),
+        ([scenes[1], walk], "b.langflash was not opened, since a film came with it"),
     ):
         desk = Desk()
         desk.perform(show.OpenPaths(tuple(map(str, given))))

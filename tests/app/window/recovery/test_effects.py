@@ -218,7 +218,7 @@ def test_photos_that_have_gone_are_named_in_one_sentence(desk: Desk, info, tmp_p
     desk.work()
     desk.perform(keep.EndOffer(restore=True))
     assert [photo.path for photo in desk.state.scene.photos] == [paths[1]]
-    assert "photo 0.jpg of the tray cannot be found" in desk.state.toasts[-1].text
+    assert "photo 0.jpg can no longer be found" in desk.state.toasts[-1].text
 
 
 def test_the_room_that_restored_edits_replace_keeps_its_own_photos(desk: Desk, info, tmp_path: Path) -> None:

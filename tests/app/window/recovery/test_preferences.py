@@ -133,9 +133,9 @@ def test_a_window_that_never_ends_writing_is_waited_for_and_said(folders: Path, 
     preferences.save(DEFAULTS)
     with locks.one_at_a_time(preferences.file().with_suffix(".lock")):
         said = preferences.try_to_save(replace(DEFAULTS, theme="light"), DEFAULTS)
-    assert "not kept" in said and preferences.load() == (DEFAULTS, "")
+    assert "could not be saved" in said and preferences.load() == (DEFAULTS, "")
 
 
 def test_a_folder_that_cannot_be_written_is_a_sentence(folders: Path) -> None:
     (folders / "config").write_text("a file in the way")
-    assert "not kept" in preferences.try_to_save(DEFAULTS)
+    assert "could not be saved" in preferences.try_to_save(DEFAULTS)

@@ -48,7 +48,7 @@ def test_a_killed_session_comes_back_whole(display: str, scene_file: Path, folde
     running.leave()
 
     again = Program(display)
-    again.click("Go on with it")
+    again.click("Restore")
     after = again.until(lambda s: s["deleted"] == COUNT and s["job"] is None, "the restored edits")
     after = again.until(lambda s: s["mode"] == "heat" and s["pose"] == before["pose"], "camera and mode")
     assert (after["scene"], after["edits"]) == (before["scene"], before["edits"])

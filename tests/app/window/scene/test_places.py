@@ -42,8 +42,8 @@ def test_what_was_left_out_is_said() -> None:
     info = many(LEFT_OUT).scene.info
     assert info is not None
     assert places.left_out(info) == [
-        "Not placed, too little of it is on other photos: IMG_7.jpg.",
-        "Parts of 1 photo (ringed) are left out, the others show something else there.",
+        "Could not be placed, too little overlap with other photos: IMG_7.jpg.",
+        "Parts of 1 photo (ringed) were left out: other photos show something else there.",
         "Of 480 frames of walk.mp4 12 were blurred.",
     ]
     odd = many({"shares": [0.5], "unplaced": "x", "films": [3, {"film": 1}]}).scene.info

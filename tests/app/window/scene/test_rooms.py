@@ -227,3 +227,21 @@ def test_a_scene_that_cannot_be_opened_leaves_waiting_photos() -> None:
     state = after(shown_scene(), show.SetPhotosAside(), show.AddPhotos((Path("new.png"),)))
     state = after(state, show.OpenScene(Path("missing.langflash")), show.JobFailed("there is no such file"))
     assert [p.path.name for p in state.scene.photos] == ["new.png"]
+
+
+def test_saving_before_quitting_quits(desk: Desk, tmp_path: Path) -> None:
+    """It saved, and the window stayed."""
+    place = tmp_path / "room.langflash"
+    desk.perform(do.Leave(), show.SaveFirst())
+    assert desk.state.dialog is Dialog.SAVE
+    desk.perform(show.SaveScene(place))
+    assert not desk.state.leaving, "it is not saved yet"
+    desk.perform(show.SceneSaved(place))
+    assert desk.state.leaving
+
+
+def test_who_cancels_quitting_may_save_and_stay(desk: Desk, tmp_path: Path) -> None:
+    place = tmp_path / "room.langflash"
+    desk.perform(do.Leave(), show.SaveFirst(), do.ShowDialog(None), do.ShowDialog(Dialog.SAVE))
+    desk.perform(show.SaveScene(place), show.SceneSaved(place))
+    assert not desk.state.leaving and desk.state.scene.pending == ()

@@ -56,14 +56,14 @@ def leaning(state: State) -> float:
 
 def test_levelling_is_an_edit_that_is_saved_and_undone(shown: State, tmp_path: Path) -> None:
     looking = after(shown, LevelScene())
-    assert told(looking).startswith("Looking for the floor")
+    assert told(looking).startswith("Finding the floor")
     (answer,) = after(
         looking, Levelled(STANDS)
     ).toasts  # the question stayed beside it, as if it were still open
-    assert answer.text.startswith("Level:")
+    assert answer.text.startswith("Levelled")
     state = after(shown, Levelled(STANDS))
-    assert state.world == STANDS and state.editing.unsaved and told(state).startswith("Level: up as edges")
-    assert "a guess from door" in told(state)
+    assert state.world == STANDS and state.editing.unsaved and told(state).startswith("Levelled by edges")
+    assert "scale guessed from door" in told(state)
     assert after(state, edit.Undo()).world is None and after(state, edit.Undo(), edit.Redo()).world == STANDS
     assert state.scene.info is not None
     list(WriteScene(state.scene.info.scene, tmp_path / "s.langflash", state.editing.marks).run(never))
@@ -75,7 +75,7 @@ def test_levelling_is_an_edit_that_is_saved_and_undone(shown: State, tmp_path: P
     measured = after(state.with_editing(ruler=((0.0, 0.0, 1.0), (0.3, 0.0, 1.0))), point.SetLength(0.6))
     assert "guess" not in told(after(measured, Levelled(STANDS))), "what was told is no guess any more"
     leans = replace(STANDS, up_by="surfaces", up_error=6.0)
-    assert "do not tell for sure" in told(after(shown, Levelled(leans)))
+    assert "do not clearly show" in told(after(shown, Levelled(leans)))
 
 
 def test_the_worker_finds_what_the_library_finds(shown: State) -> None:

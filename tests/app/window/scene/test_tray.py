@@ -188,8 +188,8 @@ def test_undo_takes_back_what_was_done_last() -> None:
 
 
 def test_the_pair_and_the_way_back_stand_in_the_palette_and_beside_reconstruct(items: Items) -> None:
-    pair = named("Keep the two photos that make the best scene together")
-    back = named("Put photos back that were taken out")
+    pair = named("Keep only the two best photos")
+    back = named("Put back the photos that were removed")
     assert pair.make(with_photos(FEW)) is None and back.make(with_photos(FEW)) is None
     assert pair.make(with_photos(MANY)) == show.ChoosePair() and pair.make(at_work()) is None
     living = Living(after(with_photos(MANY), show.ChoosePair(), show.PairChosen(MANY, (1, 3))))
