@@ -102,7 +102,8 @@ class Window:
         """At a photo's place, or between; its picture is drawn."""
         self.perform(camera.MoveTo(place) if isinstance(place, Pose) else camera.JumpTo(place))
         self.perform(Tick(self.state.now + FLIGHT_SECONDS + 1))
-        while getattr(self.viewport.drawn, "pose", None) != self.state.scene.pose:
+        shown = lambda: self.viewport.texture is not None and self.viewport.drawn  # noqa: E731
+        while getattr(shown(), "pose", None) != self.state.scene.pose:
             self.viewport.update(self.state, WINDOW, self.state.now)
 
     def drag(self, across: float, along: float, frames: int) -> Iterator[Pose]:

@@ -14,7 +14,7 @@ from langflash_core.geometry import poses
 from langflash_core.geometry.poses import Pose
 
 from ...commands import Command
-from ...editing.panels.hands import pointer
+from ...kit import widgets
 from ...kit.look import Look
 from ...state import State
 from .. import camera, near
@@ -39,7 +39,7 @@ def draw(state: State, look: Look, corner: ImVec2, size: ImVec2) -> list[Command
     Alt orbits."""
     io, issued = imgui.get_io(), list[Command]()
     if imgui.is_item_activated():
-        issued.append(camera.TakeHold(pointer(corner), orbits=io.key_alt))
+        issued.append(camera.TakeHold(widgets.pointer(corner), orbits=io.key_alt))
     start = state.scene.pose
     pose, refused = _dragged(state, look, size)
     if imgui.is_item_hovered() and (io.mouse_wheel or io.mouse_wheel_h):
