@@ -21,7 +21,7 @@ RIGHTING = math.radians(15.0)
 """Of turning, within which most of a photo's roll is gone."""
 ASLANT = math.radians(2.0)  # of a photo's roll, which one sees
 AT_PHOTO = 0.005  # of the distance to what a photo looks at: so near to its place one stands there
-ENOUGH, LEAST = 0.9, 0.6
+ENOUGH, LEAST = 0.9, 0.7
 """Of a picture, known: a move that leads to less than enough slows down, and stops at the least."""
 UNHURRIED = 0.25  # pace of keys and wheel where a drag stops: each press, each notch is meant
 TURN_PART = math.radians(3.0)  # of a move that is judged at once
