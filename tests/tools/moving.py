@@ -24,7 +24,7 @@ import moderngl
 import numpy as np
 from imgui_bundle import ImVec2, imgui
 from PIL import Image
-from scipy.spatial import cKDTree
+from scipy.spatial import KDTree
 
 import langflash_core as lf
 from app.gl import moving_renderer
@@ -144,7 +144,7 @@ class Judge:
         self._renderer = moving_renderer(ctx)
         self._renderer.set_scene(scene)
         solid = scene.gaussians.opacities > SHOWN
-        self._surfaces = cKDTree(scene.gaussians.means[solid].double().numpy())
+        self._surfaces = KDTree(scene.gaussians.means[solid].double().numpy())
         self._near = NEAR * depth
 
     def seen(self, pose: Pose) -> Seen:

@@ -83,7 +83,7 @@ def test_a_drag_looks_around_where_a_photo_was_taken_and_orbits_elsewhere(state:
     orbits = after(state, camera.TakeHold((5.0, 5.0), orbits=True))
     for other in (orbits, after(away, camera.TakeHold((5.0, 5.0)))):
         assert other.scene.hold is not None and not other.scene.hold.looks
-    flat = state.with_scene(pose=poses.orthographic(state.scene.pose, *state.scene.info.extent))
+    flat = state.with_scene(pose=poses.orthographic(state.scene.pose, *(state.scene.info.extent or ())))
     assert not near.at_photo(flat)
 
 
@@ -102,7 +102,9 @@ def test_the_pivot_is_what_lies_under_the_hand_or_the_middle_of_what_is_near(awa
     nothing, around, pose = pressed.scene.hold, near.surroundings(away), away.scene.pose
     assert nothing is not None and nothing.pivot is not None and around is not None
     way = pose.axes.T @ (np.array(nothing.pivot) - pose.centre)
-    np.testing.assert_allclose(way, (0, 0, around.middle(pose)), atol=EXACT)
+    depth = around.middle(pose)
+    assert depth is not None
+    np.testing.assert_allclose(way, (0, 0, depth), atol=EXACT)
     assert after(away, camera.HoldPlace(Vector(0.0, 0.0, 1.0))) == away, "no hand is there"
     assert after(pressed, camera.LetGo()).scene.hold is None
 
@@ -175,8 +177,8 @@ def test_a_quick_drag_ends_where_a_slow_one_does(state: State) -> None:
     for _ in range(20):
         slow, _ = near.orbited(state, slow, STEP, 0.0)
     quick, _ = near.orbited(state, state.scene.pose, 20 * STEP, 0.0)
-    # Parts are alike, but their ends may fall a part apart where they slow down.
-    assert math.dist(quick.centre, slow.centre) < math.radians(3) * slow.reach
+    # Parts are alike, but each of them stops on the last part before too little is known.
+    assert math.dist(quick.centre, slow.centre) < 2 * near.TURN_PART * slow.reach
 
 
 def test_a_drag_insists_once_it_went_in_vain_for_long_enough(state: State) -> None:
