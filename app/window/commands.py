@@ -56,7 +56,7 @@ class Tick:
         pose, flight = state.scene.pose, state.scene.flight
         if flight is not None:
             fraction = (self.now - flight.began) / FLIGHT_SECONDS
-            pose = poses.blend(flight.start, flight.end, fraction)
+            pose = poses.blend(flight.start, flight.end, fraction, state.up)
             flight = flight if fraction < 1.0 else None
         tour = state.filming.tour
         if tour is not None:

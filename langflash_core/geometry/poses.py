@@ -29,8 +29,7 @@ NEAREST = 0.02  # scene units in front of the camera from which something is mar
 MIN_POLE_DEGREES = 4.0  # how near to straight up or down an orbit may come
 FOV_RANGE = (15.0, 120.0)
 FRAME_MARGIN = 1.08  # around what is framed
-NEAR, FARTHEST = 45.0, 70.0  # degrees aside of the photos: orbits slow down, and stop
-SLOWING_STEP = 2.0  # degrees
+NEAR = 45.0  # degrees aside of the photos to which a look along an axis keeps
 STAY, FLIGHT = 1.5, 2.5  # seconds at a stop of a tour, and to the next one
 
 
@@ -202,36 +201,30 @@ def _at_reach(pose: Pose, reach: float) -> Pose:
     return replace(pose, centre=Vector(*centre.tolist()), reach=reach)
 
 
-def orbit(pose: Pose, yaw: float, pitch: float, up: Float[np.ndarray, "3"] = UP) -> Pose:
-    """Turn around the pivot, radians: yaw about up (unit), pitch about the camera's x axis."""
-    turned = look(pose, yaw, pitch, up)
-    centre = pose.pivot - pose.reach * turned.axes[:, 2]
-    return replace(turned, centre=Vector(*centre.tolist()))
-
-
-def orbit_near(
-    pose: Pose, yaw: float, pitch: float, places: Sequence[Vector], up: Float[np.ndarray, "3"] = UP
+def orbit(
+    pose: Pose,
+    yaw: float,
+    pitch: float,
+    up: Float[np.ndarray, "3"] = UP,
+    pivot: Float[np.ndarray, "3"] | None = None,
 ) -> Pose:
-    """`orbit`, slower and slower to a stop between `NEAR` and `FARTHEST` degrees from the nearest of some
-    places, as the pivot sees them. It is free without places, on the way back, and for who went farther
-    on another way."""
-    if not places:
-        return orbit(pose, yaw, pitch, up)
-    # In small steps, so that a quick drag ends where a slow one does.
-    steps = max(1, math.ceil(math.degrees(max(abs(yaw), abs(pitch))) / SLOWING_STEP))
-    for _ in range(steps):
-        pose = _slowed(pose, yaw / steps, pitch / steps, places, up)
-    return pose
+    """Turn around a point, radians: yaw about up (unit), pitch about the camera's x axis.
+
+    pivot: (3,) world, which stays where it is in the picture; None: the pose's own.
+    """
+    return around(pose, look(pose, yaw, pitch, up), pivot)
 
 
-def _slowed(pose: Pose, yaw: float, pitch: float, places: Sequence[Vector], up: np.ndarray) -> Pose:
-    turned = orbit(pose, yaw, pitch, up)
-    before, after = (degrees_aside(at, places) for at in (pose, turned))
-    if after <= max(before, NEAR) or before > FARTHEST:
-        return turned
-    share = (FARTHEST - max(before, NEAR)) / (FARTHEST - NEAR)
-    held = orbit(pose, yaw * share, pitch * share, up)
-    return pose if degrees_aside(held, places) > FARTHEST else held
+def around(pose: Pose, turned: Pose, pivot: Float[np.ndarray, "3"] | None = None) -> Pose:
+    """The pose turned as far as another from its place, but around a pivot (3,), which then is as far ahead
+    as it looks deep; None: its own."""
+    if pivot is None or pose.span is not None:  # by parallel rays `reach` keeps the scene ahead
+        centre = pose.pivot - pose.reach * turned.axes[:, 2]
+        return replace(turned, centre=Vector(*centre.tolist()))
+    way = pose.axes.T @ (np.array(pose.centre) - pivot)  # in camera axes, which it keeps
+    return replace(
+        turned, centre=Vector(*(pivot + turned.axes @ way).tolist()), reach=max(-way[2], MIN_REACH)
+    )
 
 
 def degrees_aside(pose: Pose, places: Sequence[Vector]) -> float:
@@ -349,10 +342,11 @@ def framing(pose: Pose, low: Vector, high: Vector) -> Pose:
     return replace(pose, centre=Vector(*centre.tolist()), reach=reach)
 
 
-def blend(start: Pose, end: Pose, fraction: float) -> Pose:
+def blend(start: Pose, end: Pose, fraction: float, up: Float[np.ndarray, "3"] | None = None) -> Pose:
     """Between two poses: slerp of the rotations, smooth start and stop; exact at both ends.
 
-    Between perspective and parallel rays the way is one in perspective.
+    Between perspective and parallel rays the way is one in perspective. up: unit; heading, pitch and roll go
+    their own ways instead, so that between two level pictures all are.
     """
     if fraction <= 0.0:
         return start
@@ -366,13 +360,34 @@ def blend(start: Pose, end: Pose, fraction: float) -> Pose:
 
     return Pose(
         centre=Vector(*(mix(a, b) for a, b in zip(start.centre, end.centre, strict=True))),
-        rotation=Rotation(*rotations.slerp(start.rotation, end.rotation, t)),
+        rotation=Rotation(*rotations.slerp(start.rotation, end.rotation, t))
+        if up is None
+        else _between(start, end, t, up),
         reach=mix(start.reach, end.reach),
         fov=mix(start.fov, end.fov),
         aspect=mix(start.aspect, end.aspect),
         shift=(mix(start.shift[0], end.shift[0]), mix(start.shift[1], end.shift[1])),
         span=None if start.span is None or end.span is None else mix(start.span, end.span),
     )
+
+
+def _between(start: Pose, end: Pose, t: float, up: np.ndarray) -> Rotation:
+    """The rotation a share t of the way, by heading, pitch and roll."""
+    level = np.linalg.svd(up[None])[2][1:]  # (2, 3) two directions across up
+    first, last = (np.array(_angles(pose, up, level)) for pose in (start, end))
+    way = (last - first + math.pi) % (2 * math.pi) - math.pi  # the shorter way around
+    heading, pitch, rolled = first + t * way
+    right = math.cos(heading) * level[0] + math.sin(heading) * level[1]
+    ahead = math.cos(pitch) * np.cross(up, right) + math.sin(pitch) * up
+    axes = np.stack((right, np.cross(ahead, right), ahead), axis=1)
+    return _rotation(about(ahead, rolled) @ axes)
+
+
+def _angles(pose: Pose, up: np.ndarray, level: np.ndarray) -> tuple[float, float, float]:
+    """Heading of the picture's right side, pitch and roll, radians."""
+    across = level @ righted(pose, up).axes[:, 0]
+    pitch = math.asin(min(max(float(pose.axes[:, 2] @ up), -1.0), 1.0))
+    return math.atan2(across[1], across[0]), pitch, roll(pose, up)
 
 
 def tour_seconds(count: int) -> float:

@@ -50,7 +50,7 @@ def draw(state: State, look: Look) -> list[do.Command]:
     if state.scene.info is None:
         return over
     if taken:  # the picture is there even so: a press that comes right beside the gizmo finds it hovered
-        pose = moving.flown(state.scene.pose, state.preferences.speed)
+        pose = moving.walked(state, state.scene.pose)
         return over + ([camera.MoveTo(pose)] if pose != state.scene.pose else [])
     issued = over + hands.hover(state, corner)
     if state.editing.draws and not imgui.get_io().key_alt:
@@ -61,6 +61,4 @@ def draw(state: State, look: Look) -> list[do.Command]:
         issued += hands.ask(look, corner)
     elif state.editing.tool is Tool.MOVE and imgui.get_io().key_ctrl:
         issued += [TakePartAt(each.at) for each in hands.ask(look, corner)]
-    pose = moving.pointed(state, look, size)
-    pose = moving.flown(pose, state.preferences.speed)
-    return issued + ([camera.MoveTo(pose)] if pose != state.scene.pose else [])
+    return issued + moving.draw(state, look, corner, size)

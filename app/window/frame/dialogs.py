@@ -38,7 +38,8 @@ WIDTHS = {  # design pixels; others 520
     Dialog.FILM: strip.WIDTH,
 }
 GESTURES = (
-    ("Left drag", "orbit"),
+    ("Left drag", "orbit; where a photo was taken, look around"),
+    ("Alt + left drag", "orbit, there too"),
     ("Middle drag, Shift + left drag", "pan"),
     ("Wheel", "zoom"),
     ("Right drag", "look around"),

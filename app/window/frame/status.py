@@ -41,6 +41,8 @@ def figures(state: State) -> list[str]:
     aside = degrees_from_photos(state)
     if flown_past(state):
         said.insert(0, "the scene is behind you: press H to go back")
+    elif state.scene.hold is not None and state.scene.hold.refused:
+        said.insert(0, "no photo saw more on this side: drag on to go there all the same")
     elif aside > FADING:
         said.append(f"{aside:.0f}° away from the nearest photo: expect holes")
     if state.scene.info is not None:

@@ -276,3 +276,9 @@ def at_right_edge(text: str) -> None:
     edge = imgui.get_cursor_pos_x() + imgui.get_content_region_avail().x
     imgui.same_line(edge - imgui.calc_text_size(text).x)
     imgui.text(text)
+
+
+def pointer(corner: ImVec2) -> tuple[float, float]:
+    """Where the pointer is in the place that begins at `corner`, framebuffer pixels."""
+    at, pixels = imgui.get_mouse_pos(), imgui.get_io().display_framebuffer_scale
+    return (at.x - corner.x) * pixels.x, (at.y - corner.y) * pixels.y

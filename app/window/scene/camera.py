@@ -1,6 +1,6 @@
 """What can happen to the picture: its mode, the pose it is seen from, the photo beside it."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -9,9 +9,10 @@ from langflash_core.geometry.poses import Pose, Vector
 from langflash_core.pictures import Picture
 
 from ..commands import Notify
+from ..editing.state import Point
 from ..state import State
-from .near import orbited, places_to_keep_to
-from .state import Flight
+from .near import at_photo, first_stand, middle_of_near, orbited, places_to_keep_to
+from .state import Flight, Hold
 
 
 @dataclass(frozen=True)
@@ -26,7 +27,7 @@ class SetMode:
 
 @dataclass(frozen=True)
 class JumpTo:
-    """Fly to input view `view`; `Home` is view 0."""
+    """Fly to input view `view`."""
 
     view: int
 
@@ -116,10 +117,14 @@ the first photo's side."""
 
 @dataclass(frozen=True)
 class Home:
-    """Fly back to the first photo's view."""
+    """Fly back to where the scene opened: to the first photo's view, upright."""
 
     def apply(self, state: State) -> State:
-        return JumpTo(0).apply(state)
+        info = state.scene.info
+        if info is None or not info.views:
+            return state
+        there = first_stand(info, state.world)
+        return JumpTo(0).apply(state) if there == info.views[0] else FlyTo(there).apply(state)
 
 
 @dataclass(frozen=True)
@@ -134,13 +139,58 @@ class MoveTo:
 
 @dataclass(frozen=True)
 class Orbit:
-    """A step around what is looked at, radians; slower and to a stop where photos know nothing more."""
+    """A step around what is looked at, radians; held as `near.held` has it."""
 
     yaw: float = 0.0
     pitch: float = 0.0
 
     def apply(self, state: State) -> State:
-        return MoveTo(orbited(state, state.scene.pose, self.yaw, self.pitch)).apply(state)
+        return MoveTo(orbited(state, state.scene.pose, self.yaw, self.pitch)[0]).apply(state)
+
+
+@dataclass(frozen=True)
+class TakeHold:
+    """A hand presses on a pixel of the picture's place, framebuffer pixels. Where a photo was taken it looks
+    around; elsewhere, and where it `orbits`, it turns around what is under it, or else what is near."""
+
+    at: Point
+    orbits: bool = False
+
+    def apply(self, state: State) -> State:
+        looks = not self.orbits and at_photo(state)
+        return state.with_scene(hold=Hold(looks, middle_of_near(state)))
+
+
+@dataclass(frozen=True)
+class HoldPlace:
+    """What is under the hand, of the scene."""
+
+    place: Vector
+
+    def apply(self, state: State) -> State:
+        hold = state.scene.hold
+        return state if hold is None else state.with_scene(hold=replace(hold, pivot=self.place))
+
+
+@dataclass(frozen=True)
+class Pull:
+    """A drag: stand at `pose`. refused: design pixels of it that went in vain."""
+
+    pose: Pose
+    refused: float = 0.0
+
+    def apply(self, state: State) -> State:
+        hold = state.scene.hold or Hold()
+        state = MoveTo(self.pose).apply(state)
+        return state.with_scene(hold=replace(hold, refused=hold.refused + self.refused))
+
+
+@dataclass(frozen=True)
+class LetGo:
+    """The hand leaves the picture."""
+
+    def apply(self, state: State) -> State:
+        return state.with_scene(hold=None)
 
 
 @dataclass(frozen=True)

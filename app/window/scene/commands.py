@@ -1,13 +1,12 @@
 """What can happen to the tray and to the scene: photos, files, the jobs that make scenes."""
 
-import math
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from langflash_core.geometry import poses, rotations
+from langflash_core.geometry import poses
 from langflash_core.images.still_names import shown_name
 from langflash_core.scene.edits import Marks, delete, deny_atom
 from langflash_core.scene.mask import Mask
@@ -19,6 +18,7 @@ from ..filming.state import NO_FILMING
 from ..state import State
 from .drops import MAX_PHOTOS
 from .memory import SceneMemory
+from .near import first_stand
 from .state import (
     MOMENTS,
     MOST_ROOMS,
@@ -37,8 +37,6 @@ from .unfinished import FEWEST
 if TYPE_CHECKING:
     from langflash_core.types import Scene
 
-ASLANT = math.radians(2.0)
-"""Of a photo's roll that one sees."""
 
 # Photos
 
@@ -297,7 +295,7 @@ class SceneArrived:
         old, info, asking = state.scene, self.info, state.asking.without_scene()
         made = old.job is not None and old.job.title == RECONSTRUCTING
         saved = None if info.history is None else info.history.first
-        start = _start(info)
+        start = first_stand(info, None if info.history is None else info.history.marks.world)
         return replace(
             state,
             scene=replace(
@@ -308,6 +306,7 @@ class SceneArrived:
                 aside=None,
                 pose=start,
                 flight=None,
+                hold=None,
                 view=0 if info.views and start == info.views[0] else None,
                 unhidden=None,
                 shown_by=(),
@@ -319,19 +318,6 @@ class SceneArrived:
             listing=state.listing.without_scene(),
             recovery=replace(state.recovery, edits=None, kept=None),
         )
-
-
-def _start(info: SceneInfo) -> poses.Pose:
-    """Where one stands first: as the first photo saw it, upright where that was held aslant and it is known
-    how the scene stands."""
-    world = None if info.history is None else info.history.marks.world
-    start = info.views[0] if info.views else poses.START
-    if world is None:
-        return start
-    turn = rotations.matrix(world.turn)
-    if not info.views:
-        return poses.facing(start, poses.Vector(*turn[2].tolist()), -turn[1])
-    return poses.righted(start, -turn[1]) if abs(poses.roll(start, -turn[1])) > ASLANT else start
 
 
 def room_of(state: State, info: SceneInfo) -> Room:

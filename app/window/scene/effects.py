@@ -8,17 +8,18 @@ from pathlib import Path
 from langflash_core.colormaps import colour_bar
 from langflash_core.errors import LangFlashError
 from langflash_core.formats import COLOUR_MAPS
+from langflash_core.geometry.poses import Vector
 from langflash_core.reconstruction.networks import Networks
 
 from ..commands import Command, Notify
 from ..editing.placing import SetHandle
-from ..editing.state import Handle
+from ..editing.state import Handle, Point
 from ..effects import Effects, Hands
 from ..kit.textures import Thumbnails
 from ..opening.commands import OpenFilm, films_of
 from ..state import State
 from ..viewport import Viewport
-from .camera import FrameAll
+from .camera import FrameAll, HoldPlace, TakeHold
 from .commands import (
     AddPhotos,
     All,
@@ -106,12 +107,20 @@ class SceneEffects(Effects):
             case Thinned(scene, share, thinned, rows):
                 with self._told():
                     self._viewport.thin(scene, share, thinned, rows)
+            case TakeHold(at):
+                self._hold(at)
             case Loaded() if state.scene.info is None and self._viewport.warm():
                 self._hands.dispatch(Loaded())
             case _:
                 self._go_on(command, before, state)
         self._look_for_work(before, state)
         self._show_whole(before, state)
+
+    def _hold(self, at: Point) -> None:
+        """A hand turns the scene around what the picture shows under it."""
+        found = self._viewport.read(at)
+        if found is not None and found[0].point is not None:
+            self._hands.perform(HoldPlace(Vector(*found[0].point)))
 
     def _end_job(self, state: State) -> None:
         """A job that is paused keeps its work, one that is cancelled does not."""

@@ -13,6 +13,7 @@ from langflash_core.scene.changes import Change
 from langflash_core.scene.edits import Marks
 
 if TYPE_CHECKING:
+    from langflash_core.scene.surroundings import Surroundings
     from langflash_core.types import Gaussians, Scene
 
 Answer = TypeVar("Answer")
@@ -45,6 +46,12 @@ class SceneMemory:
         answer = ask()
         self._answers[question] = (about, answer)
         return answer
+
+    def surroundings(self) -> "Surroundings | None":
+        """What is around a camera in the scene as it came; slow when asked for the first time."""
+        from langflash_core.scene.surroundings import surroundings_of
+
+        return self.answered("surroundings", (), lambda: surroundings_of(self.scene))
 
     def _under(self, changes: tuple[Change, ...]) -> "Gaussians":
         """After all changes, going on from a result that is the beginning of them, where one is there."""

@@ -1,16 +1,33 @@
 """Where the photos were taken, for whoever keeps to what they saw; turns that know it and which way is up."""
 
 import math
+from collections.abc import Callable
+from dataclasses import replace
 
 import numpy as np
+from jaxtyping import Bool
 
-from langflash_core.geometry import poses
+from langflash_core.geometry import poses, rotations
 from langflash_core.geometry.poses import Pose, Vector
+from langflash_core.records import World
+from langflash_core.scene.changes import Moved
+from langflash_core.scene.edits import Marks
+from langflash_core.scene.surroundings import Surroundings
 
 from ..state import State
+from .state import SceneInfo
 
 RIGHTING = math.radians(15.0)
 """Of turning, within which most of a photo's roll is gone."""
+ASLANT = math.radians(2.0)  # of a photo's roll, which one sees
+AT_PHOTO = 0.005  # of the distance to what a photo looks at: so near to its place one stands there
+ENOUGH, LEAST = 0.9, 0.7
+"""Of a picture, known: a move that leads to less than enough slows down, and stops at the least."""
+UNHURRIED = 0.25  # pace of keys and wheel where a drag stops: each press, each notch is meant
+TURN_PART = math.radians(3.0)  # of a move that is judged at once
+MOST_PARTS = 40  # of one frame's move: some 20 ms
+PUSHES = 3  # out of surfaces, one after the other, as in a corner
+TOUCHING = 1e-3  # of the way that is kept clear, by which they may err
 FADING = 30.0  # degrees aside from which the picture fades: `FULL` of langflash_core/scene/trust.py
 
 
@@ -67,18 +84,147 @@ def flown_past(state: State) -> bool:
     return float(forward @ (farthest - np.array(pose.centre))) < 0
 
 
-def orbited(state: State, pose: Pose, yaw: float, pitch: float) -> Pose:
-    """The pose turned around its pivot, radians, no farther than photos know. A photo that was held aslant
-    comes upright on the way, in a scene of which it is known how it stands."""
-    return _righted(state, poses.orbit_near(pose, yaw, pitch, places_to_keep_to(state), state.up), yaw, pitch)
+def surroundings(state: State) -> Surroundings | None:
+    """What holds a camera back, as edits left it; None where nothing does. What was moved stands nowhere."""
+    info, marks = state.scene.info, state.editing.marks
+    if info is None or not keeps_near(state):
+        return None
+    around = info.memory.surroundings()
+    if around is None or marks is None:
+        return around
+    about = (marks.deleted, marks.hidden, marks.there, marks.changes)
+    return info.memory.answered("surroundings left", about, lambda: around.of(_standing(marks)))
 
 
-def looked(state: State, pose: Pose, yaw: float, pitch: float) -> Pose:
+def _standing(marks: Marks) -> Bool[np.ndarray, " N"]:
+    there = marks.visible.rows()
+    for change in marks.changes:
+        if isinstance(change, Moved):
+            there &= ~change.rows.rows()
+    return there
+
+
+def at_photo(state: State) -> bool:
+    """Whether one stands where a photo was taken."""
+    pose, info = state.scene.pose, state.scene.info
+    if info is None or pose.span is not None:
+        return False
+    return any(math.dist(view.centre, pose.centre) <= AT_PHOTO * view.reach for view in info.views)
+
+
+def first_stand(info: SceneInfo, world: World | None) -> Pose:
+    """Where one stands first: as the first photo saw it, upright where that was held aslant and it is known
+    how the scene stands."""
+    start = info.views[0] if info.views else poses.START
+    if world is None:
+        return start
+    turn = rotations.matrix(world.turn)
+    if not info.views:
+        return poses.facing(start, Vector(*turn[2].tolist()), -turn[1])
+    return poses.righted(start, -turn[1]) if abs(poses.roll(start, -turn[1])) > ASLANT else start
+
+
+def middle_of_near(state: State) -> Vector | None:
+    """Ahead, as far away as the middle of what is near in the picture; None where nobody knows."""
+    pose, around = state.scene.pose, surroundings(state)
+    depth = None if around is None else around.middle(pose)
+    return None if depth is None else Vector(*(np.array(pose.centre) + depth * pose.axes[:, 2]).tolist())
+
+
+# Moves, each with the share of it that was done
+
+
+def orbited(
+    state: State, pose: Pose, yaw: float, pitch: float, pivot: Vector | None = None, least: float = 0.0
+) -> tuple[Pose, float]:
+    """The pose turned around a pivot, radians; None: its own. A photo that was held aslant comes upright on
+    the way, in a scene of which it is known how it stands. least: as in `held`."""
+    about = None if pivot is None else np.array(pivot)
+
+    def move(pose: Pose, share: float) -> Pose:
+        return poses.around(pose, _turned(state, pose, share * yaw, share * pitch), about)
+
+    return held(state, pose, move, least)
+
+
+def looked(state: State, pose: Pose, yaw: float, pitch: float, least: float = 0.0) -> tuple[Pose, float]:
     """The pose turned on the spot, radians; upright on the way, as in `orbited`."""
-    return _righted(state, poses.look(pose, yaw, pitch, state.up), yaw, pitch)
+    return held(state, pose, lambda at, share: _turned(state, at, share * yaw, share * pitch), least)
 
 
-def _righted(state: State, pose: Pose, yaw: float, pitch: float) -> Pose:
+def flown(
+    state: State, pose: Pose, right: float, down: float, forward: float, least: float = 0.0
+) -> tuple[Pose, float]:
+    """The pose moved along its own axes, scene units."""
+    move = lambda at, share: poses.fly(at, share * right, share * down, share * forward)  # noqa: E731
+    return held(state, pose, move, least)
+
+
+def zoomed(state: State, pose: Pose, factor: float) -> Pose:
+    """The pose at so many times the distance from its pivot; a turn of the wheel is no slip."""
+    return held(state, pose, lambda at, share: poses.zoom(at, factor**share), UNHURRIED)[0]
+
+
+def held(
+    state: State, pose: Pose, move: Callable[[Pose, float], Pose], least: float = 0.0
+) -> tuple[Pose, float]:
+    """A move as far as it leads into no surface, and slower and to a stop where less and less of the picture
+    is known; free on the way back, and where nothing is kept to. Along a surface it slides.
+
+    Args:
+        move: the pose after a share of the whole move. least: pace at which it goes on without a stop.
+
+    Returns:
+        The pose, and the share that was done.
+    """
+    around, whole = surroundings(state), move(pose, 1.0)
+    if around is None:
+        return whole, 1.0
+    parts, done = _parts(pose, whole, around), 0.0
+    known = around.known(pose)
+    for _ in range(parts):
+        after = move(pose, 1 / parts)
+        there = around.known(after)
+        share = _pace(known, there, least)
+        moved = _beside(around, pose, after if share == 1 else move(pose, share / parts))
+        if share == 0 or moved is None:
+            break
+        known = there if moved is after else around.known(moved)
+        pose, done = moved, done + share / parts
+    return pose, done
+
+
+def _parts(pose: Pose, whole: Pose, around: Surroundings) -> int:
+    """In how many parts a move is judged: a quick drag ends where a slow one does, and passes no wall."""
+    way = math.dist(pose.centre, whole.centre) / (around.clear / 2)
+    cosine = (float(np.trace(pose.axes.T @ whole.axes)) - 1) / 2
+    turn = math.acos(min(max(cosine, -1.0), 1.0)) / TURN_PART
+    return min(max(1, math.ceil(way), math.ceil(turn)), MOST_PARTS)
+
+
+def _pace(before: float, after: float, least: float) -> float:
+    """Share of a move after which so much of the picture is known, and was before."""
+    if after >= min(before, ENOUGH):
+        return 1.0
+    return min(max((after - LEAST) / (ENOUGH - LEAST), least), 1.0)
+
+
+def _beside(around: Surroundings, before: Pose, after: Pose) -> Pose | None:
+    """The pose pushed clear of surfaces, so that it slides along them; None where that does not do. Who is
+    too near already may go away, and no nearer."""
+    least = min(around.clear, around.nearest(np.array(before.centre))[0])
+    end = np.array(after.centre)
+    for pushed in range(PUSHES + 1):
+        near, way = around.nearest(end)
+        if near >= least - TOUCHING * around.clear:
+            return replace(after, centre=Vector(*end.tolist())) if pushed else after
+        end = end - (least / max(near, 1e-12) - 1) * way
+    return None
+
+
+def _turned(state: State, pose: Pose, yaw: float, pitch: float) -> Pose:
+    """On the spot; upright on the way where it is known what is."""
+    pose = poses.look(pose, yaw, pitch, state.up)
     if state.world is None:
         return pose
     return poses.righted(pose, state.up, 1 - math.exp(-math.hypot(yaw, pitch) / RIGHTING))

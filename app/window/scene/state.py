@@ -19,6 +19,9 @@ if TYPE_CHECKING:
 
 
 FLIGHT_SECONDS = 0.7
+INSISTING = 150.0
+"""Design pixels that a drag goes in vain until it may go where no photo saw anything: an eighth of a window
+of 1280, more than a hand overshoots."""
 WHOLE_PHOTOS = 32  # of a scene, up to which all stay whole on the graphics card: 1.4 MB each
 ABOVE = "from above"
 """The picture of the map."""
@@ -186,13 +189,30 @@ class Flight:
 
 
 @dataclass(frozen=True)
+class Hold:
+    """A hand that drags on the picture. looks: it turns on the spot, as it does where a photo was taken.
+    pivot: of the scene, what it turns around; None: what the pose looks at. refused: design pixels that it
+    went in vain, for no photo saw anything there."""
+
+    looks: bool = False
+    pivot: Vector | None = None
+    refused: float = 0.0
+
+    @property
+    def insists(self) -> bool:
+        """Whether it went on for so long that it may go where no photo saw anything."""
+        return self.refused > INSISTING
+
+
+@dataclass(frozen=True)
 class Showing:
     """The scene's half of the state: the tray, the scene on show, how it is looked at, the work on it.
 
     aside: photos of the scene on show while those of a new room are in the tray. choosing: the best pair is
     being looked for. rooms: scenes that were on show before, the last one first. dropped: photos while it is
     asked where they belong. pending: commands that wait for an answer about unsaved edits. view: of the photo
-    stood at, if any. compare: where the photo begins, 0 to 1 across the picture; None: not compared.
+    stood at, if any. hold: the hand on the picture. compare: where the photo begins, 0 to 1 across the
+    picture; None: not compared.
     unfinished: photos on which work was begun and kept. taken_out: what the tray had before.
     unhidden: the scene on show as it was before something in it was hidden for good, until that is saved;
     shown_by: files of scenes that show what was hidden in it by then.
@@ -209,6 +229,7 @@ class Showing:
     pose: Pose = START
     flight: Flight | None = None
     view: int | None = None
+    hold: Hold | None = None
     compare: float | None = None
     unhidden: Room | None = None
     shown_by: tuple[Path, ...] = ()

@@ -160,10 +160,13 @@ def describe_scene(scene: "Scene", serial: int, name: str, path: Path | None = N
     views = []
     for viewmat, K in zip(scene.viewmats.double().numpy(), scene.Ks.double().numpy(), strict=True):
         views.append(from_view(viewmat, K, scene.view_size, median_reach(means, viewmat, K, scene.view_size)))
+    memory = SceneMemory(scene)
+    memory.surroundings()  # a hand on the picture does not wait for it
     return SceneInfo(
         serial=serial,
         name=name,
         scene=scene,
+        memory=memory,
         views=tuple(views),
         num_gaussians=len(scene.gaussians),
         num_atoms=scene.semantics.num_atoms,

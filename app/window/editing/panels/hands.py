@@ -7,6 +7,7 @@ from imgui_bundle import ImVec2, imgui
 from langflash_core.scene import edits
 
 from ... import commands as do
+from ...kit import widgets
 from ...kit.look import Look
 from ...state import State
 from .. import commands as edit
@@ -18,15 +19,9 @@ CLICK = 4.0  # design pixels that a click may slip
 CLOSE = 10.0  # around a polygon's first corner, in which a click closes it
 
 
-def _pointer(corner: ImVec2) -> Point:
-    """Where the pointer is in the picture's place, framebuffer pixels."""
-    pointer, pixels = imgui.get_mouse_pos(), imgui.get_io().display_framebuffer_scale
-    return (pointer.x - corner.x) * pixels.x, (pointer.y - corner.y) * pixels.y
-
-
 def hover(state: State, corner: ImVec2) -> list[do.Command]:
     """Tell where the pointer is, when that has changed."""
-    at = _pointer(corner) if imgui.is_item_hovered() and not imgui.is_item_active() else None
+    at = widgets.pointer(corner) if imgui.is_item_hovered() and not imgui.is_item_active() else None
     before = state.editing.hover.at if state.editing.hover is not None else None
     return [] if at == before else [point.Hover(at)]
 
@@ -36,7 +31,7 @@ def ask(look: Look, corner: ImVec2) -> list[point.Ask]:
     if not (imgui.is_item_deactivated() and imgui.is_mouse_released(0)):
         return []
     slipped = imgui.get_mouse_drag_delta(0, look.px(CLICK))
-    return [] if slipped.x or slipped.y else [point.Ask(_pointer(corner))]
+    return [] if slipped.x or slipped.y else [point.Ask(widgets.pointer(corner))]
 
 
 def pick(state: State, look: Look, corner: ImVec2) -> list[do.Command]:
@@ -58,7 +53,7 @@ def region(state: State, look: Look, corner: ImVec2) -> list[do.Command]:
     if not (held or let_go):
         lasting = editing.tool is Tool.LASSO  # a polygon waits for its next corner
         return [point.Drag(())] if editing.drag and not lasting else []
-    way, here = imgui.get_mouse_drag_delta(0, 0.0), _pointer(corner)
+    way, here = imgui.get_mouse_drag_delta(0, 0.0), widgets.pointer(corner)
     pixels = io.display_framebuffer_scale
     start = (here[0] - way.x * pixels.x, here[1] - way.y * pixels.y)
     path = _path(editing.tool, editing.drag, start, here)

@@ -100,7 +100,7 @@ def test_a_photo_held_aslant_comes_upright_where_one_turns(level: State) -> None
     rolls = [poses.roll(aslant, level.up)]
     pose = aslant
     for _ in range(10):
-        pose = orbited(level, pose, math.radians(3), 0.0)
+        pose, _ = orbited(level, pose, math.radians(3), 0.0)
         rolls.append(poses.roll(pose, level.up))
     assert abs(rolls[1]) > 0.5 * abs(rolls[0]) and abs(rolls[-1]) < 0.15 * abs(rolls[0])
 
