@@ -47,7 +47,9 @@ def many():
 def places(many) -> Places:
     gaussians = many.gaussians
     return Places(
-        gaussians.means.numpy(), gaussians.scales.amax(-1).numpy(), np.ones(len(gaussians.means), bool)
+        np.ascontiguousarray(gaussians.means.numpy().T),
+        gaussians.scales.amax(-1).numpy(),
+        np.ones(len(gaussians.means), bool),
     )
 
 
@@ -94,6 +96,26 @@ def test_a_quick_order_has_what_is_around_the_image(many, places):
     for moved in (turned(seen, 2), turned(seen, -2), along(seen, -0.03)):
         assert sees(seen, moved, order.depth_range, MARGIN)  # pyright: ignore[reportArgumentType]
         assert np.isin(exact_order(places, moved).rows, order.rows).mean() > 0.999  # nearer than 2 % of them
+
+
+@pytest.mark.parametrize("away", [0.0, 1e4], ids=["here", "far from the origin"])
+@pytest.mark.parametrize("flat", [False, True], ids=["lens", "orthographic"])
+def test_a_quick_order_leaves_out_none_that_an_exact_one_has(many, places, flat, away):
+    seen = turned(many.camera(0, *SIZE), 15)
+    if flat:
+        seen = dataclasses.replace(seen, K=seen.K * torch.tensor([0.3, 0.3, 1.0])[:, None], orthographic=True)
+    pose = invert_rigid(seen.viewmat.double())
+    pose[0, 3] += away
+    seen = dataclasses.replace(seen, viewmat=invert_rigid(pose))
+    moved = places.means + np.array([[away], [0], [0]], np.float32)
+    places = dataclasses.replace(places, means=moved)
+    exact, quick = exact_order(places, seen), quick_order(places, seen)
+    assert 1_000 < len(exact.rows) < 70_000
+    missing = np.setdiff1d(exact.rows, quick.rows)
+    assert len(missing) <= (0 if away == 0 else 2)  # beside the near plane, where float32 ends at .001
+    row = seen.viewmat.numpy()[2]
+    z = (row[:3] @ moved.astype(np.float64) + row[3])[quick.rows]
+    assert (z[1:] <= z[:-1] * (1 + 1 / 4000)).all()
 
 
 def test_what_a_camera_sees(many):
