@@ -1,9 +1,11 @@
 """The only composer: photos -> scene (`reconstruction.stages` has the steps), scene + phrases -> answer, or
-part of the scene, and scene -> web page.
+part of the scene, and scene -> web page. Each reads in at its first call what the others do without: a
+question waits for no network.
 """
 
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import torch
 from torch import Tensor
@@ -12,7 +14,6 @@ from langflash_core.ahead import Ahead
 from langflash_core.detail import DEFAULT_DETAIL
 from langflash_core.errors import InputError, PromptError, ViewError
 from langflash_core.export import opened
-from langflash_core.export.html import Beside, Phrases, TextModel, write_html
 from langflash_core.images.decode import grey_photo
 from langflash_core.images.lens import Intrinsics
 from langflash_core.language.answers import answer
@@ -22,12 +23,6 @@ from langflash_core.language.relevance import Mode, finite_dictionary, relevance
 from langflash_core.language.spaces import language_space
 from langflash_core.language.spoken import compile_spoken
 from langflash_core.language.vocabulary import all_phrases
-from langflash_core.meant import meant_relevance
-from langflash_core.network import choose_pair
-from langflash_core.reconstruction.networks import Networks as Networks
-from langflash_core.reconstruction.stages import STAGES as STAGES
-from langflash_core.reconstruction.stages import scene_of
-from langflash_core.reconstruction.wishes import Wishes
 from langflash_core.resources import asset_path
 from langflash_core.running import Progress, Run
 from langflash_core.scene.exposure import lit_camera
@@ -36,6 +31,10 @@ from langflash_core.scene.world import upward
 from langflash_core.splat import render as render_reference
 from langflash_core.splat.compose import some_layers
 from langflash_core.types import Camera, Frame, QueryResult, Scene
+
+if TYPE_CHECKING:
+    from langflash_core.export.html import Phrases, TextModel
+    from langflash_core.reconstruction.networks import Networks
 
 LARGEST_PICTURE = 8192
 PAGE_LAYERS = 8
@@ -62,7 +61,7 @@ def reconstruct(
     progress: Progress | None = None,
     cancelled: Callable[[], bool] | None = None,
     ahead: Ahead | None = None,
-    networks: Networks | None = None,
+    networks: "Networks | None" = None,
 ) -> Scene:
     """Photos of one room to a 3D scene that can be queried, in one forward pass.
 
@@ -107,6 +106,10 @@ def reconstruct(
         WeightsError: the checkpoint is missing or does not fit. OutputError: `keep` cannot be written.
         Cancelled: `cancelled()` became true.
     """
+    from langflash_core.reconstruction.networks import Networks
+    from langflash_core.reconstruction.stages import STAGES, scene_of
+    from langflash_core.reconstruction.wishes import Wishes
+
     wishes = Wishes(
         photos,
         preset=preset,
@@ -190,6 +193,8 @@ def select(
         PromptError: a prompt or the threshold cannot be used, or no Gaussian passes.
         WeightsError: the language space has no text weights.
     """
+    from langflash_core.meant import meant_relevance
+
     scene, prompts = opened(scene), [prompts] if isinstance(prompts, str) else prompts
     compiled = compile_spoken(scene, language_space(scene.semantics.space), list(prompts))
     limit = compiled.threshold if threshold is None else threshold
@@ -214,7 +219,7 @@ def web_page(
     with_text: bool = False,
     title: str | None = None,
     beside: Mapping[str, Scene] | None = None,
-) -> Phrases | None:
+) -> "Phrases | None":
     """Write a web page that shows the scene and answers these phrases and the whole vocabulary; of a scene of
     layers it holds those of `page_layers`.
 
@@ -233,6 +238,8 @@ def web_page(
         InputError: a scene speaks another space than the first, or none that `with_text` reads.
         OutputError: the scene holds no Gaussians, or the path cannot be written.
     """
+    from langflash_core.export.html import Beside, write_html
+
     scene, others = page_layers(scene), {name: page_layers(other) for name, other in (beside or {}).items()}
     said = {other.semantics.space for other in (scene, *others.values())}
     if len(said) > 1:
@@ -271,12 +278,14 @@ def _of_tour(scene: Scene) -> tuple[Stop | Note, ...]:
 
 def _page_phrases(
     scene: Scene, texts: Sequence[str], num_asked: int, threshold: float | None, with_text: bool
-) -> Phrases:
+) -> "Phrases":
     """What a page answers of a scene.
 
     Raises:
         PromptError: a text or the threshold cannot be used.
     """
+    from langflash_core.export.html import Phrases
+
     compiled = compile_spoken(scene, language_space(scene.semantics.space), list(texts))  # of heads alone
     limit = compiled.threshold if threshold is None else threshold
     _check_threshold(limit)
@@ -293,12 +302,14 @@ def _page_phrases(
     )
 
 
-def _text_model() -> TextModel:
+def _text_model() -> "TextModel":
     """The shipped tower as a page takes it.
 
     Raises:
         WeightsError: its files are missing or damaged.
     """
+    from langflash_core.export.html import TextModel
+
     weights, _ = shipped_files()
     ids = load_minilm().tokenizer.get_vocab()
     names = ("minilm_l6_v2.md", "minilm_l6_v2_LICENSE.txt", "xfeat_LICENSE.txt")  # Apache 2.0
@@ -326,6 +337,9 @@ def best_pair(
     Raises:
         ImageError: a photo cannot be used. Cancelled: `cancelled()` became true.
     """
+    from langflash_core.network import choose_pair
+    from langflash_core.reconstruction.stages import STAGES
+
     run = Run(STAGES, None, cancelled)
     greys = []
     for photo in photos:

@@ -343,6 +343,21 @@ def test_a_scene_survives_the_file(scene, tmp_path):
     assert (before - after).abs().mean() < 5e-3
 
 
+def test_a_question_reads_in_nothing_that_it_does_without(scene, tmp_path):
+    path = tmp_path / "room.langflash"
+    lf.save(scene, path)
+    program = (
+        "import sys\n"
+        "from app.cli import main\n"
+        "code = main(sys.argv[1:])\n"
+        "needless = {'scipy', 'cv2', 'langflash_core.network.guided', 'langflash_core.export.html'}\n"
+        "sys.exit(code or needless & set(sys.modules) or None)\n"
+    )
+    words = ["query", str(path), "book", "-o", str(tmp_path / "answers"), "--backend", "torch"]
+    subprocess.run([sys.executable, "-c", program, *words], check=True, cwd=Path(lf.__file__).parents[1])
+    assert (tmp_path / "answers" / "book_heat.png").is_file()
+
+
 def test_the_package_is_light_and_its_functions_keep_their_names():
     program = (
         "import sys, langflash_core as lf\n"

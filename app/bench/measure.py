@@ -21,6 +21,7 @@ from langflash_core.types import Camera, Scene
 
 from ..gl import SplatRenderer
 from ..gl.canvas import Canvas
+from ..gl.ordering import MOST_BEHIND
 from ..gl.processor.still import draw_still
 from ..gl.shapes import MakeShapes
 from ..gl.splats import SplatBuffers
@@ -129,7 +130,7 @@ class _Bench:
         renderer = self._renderers[key]
         renderer.forget()
         if key in self._late:
-            self._late[key].sort_for(self.camera(mode, frame - 1))
+            self._late[key].sort_for(self.camera(mode, max(frame - MOST_BEHIND, -1)))
         self.ask(renderer, mode)
         if mode.fast:
             renderer.carry()

@@ -54,17 +54,16 @@ class LayeredLevel:
         self._named: tuple = ()  # what each key names
         self._placed: tuple = ()
 
-    def prepare(self, camera: Camera, quick: bool = False) -> None:
+    def prepare(self, camera: Camera, quick: bool = False, late: bool = False) -> None:
         """Choose the layers, and order and project theirs.
 
         Args:
-            quick: `MOVING` of them, all but the nearest in half the size.
+            quick: `MOVING` of them, all but the nearest in half the size. late: as `Level.prepare` has it.
         """
         chosen = self._chosen(camera, quick)
         first, *others = parts = [self._layer(view) for view in chosen.views]
-        first.prepare(camera)
-        for part in others:
-            part.prepare(half(camera) if quick else camera)
+        for part, own in zip(parts, _cameras(camera, len(parts), quick), strict=True):
+            part.prepare(own, late=late)
         self.parts, self.halved = tuple(parts), quick and bool(others)
         self.weights = chosen.weights if others else None
         if self.weights is None:
@@ -73,9 +72,14 @@ class LayeredLevel:
         else:
             self._name(self.weights.tobytes())
 
-    def ready(self, camera: Camera, quick: bool = False) -> bool:
-        """Make one of the layers that `prepare` would have to make, which takes a frame's time; whether there
-        are no more of them."""
+    @property
+    def exact(self) -> bool:
+        """Whether all its parts are."""
+        return all(part.exact for part in self.parts)
+
+    def ready(self, camera: Camera, quick: bool = False, late: bool = False) -> bool:
+        """Make one of the layers that `prepare` would have to make, which takes a frame's time, or else begin
+        to find their orders beside the frames; whether nothing is missing any more."""
         views = self._chosen(camera, quick).views
         for view in views:
             if view in self._layers:
@@ -83,7 +87,11 @@ class LayeredLevel:
         missing = [view for view in views if view not in self._layers]
         if missing:
             self._layer(missing[0])
-        return len(missing) <= 1
+        if len(missing) > 1:
+            return False
+        cameras = _cameras(camera, len(views), quick)
+        ready = [self._layers[view].ready(own, late=late) for view, own in zip(views, cameras, strict=True)]
+        return all(ready)
 
     def _chosen(self, camera: Camera, quick: bool) -> Chosen:
         return self._nearness().chosen(camera, MOVING if quick else NEAREST)
@@ -142,6 +150,11 @@ class LayeredLevel:
             layer.release()
         self._layers.clear()
         self.parts = ()
+
+
+def _cameras(camera: Camera, num_parts: int, quick: bool) -> list[Camera]:
+    """Of each part, the nearest first."""
+    return [camera] + (num_parts - 1) * [half(camera) if quick else camera]
 
 
 def half(camera: Camera) -> Camera:

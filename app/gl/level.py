@@ -11,6 +11,7 @@ from langflash_core.scene.changed import changed
 from langflash_core.scene.changes import Change
 from langflash_core.types import Camera, Gaussians
 
+from .ordering import camera_key
 from .splats import SplatBuffers
 
 _names = count(1)  # each given once, so that no two contents are ever taken for each other
@@ -45,7 +46,9 @@ class Prepared(Protocol):
 
 
 class Level:
-    """A share of a scene's Gaussians, ordered and projected for one camera at a time; its only part."""
+    """A share of a scene's Gaussians, ordered and projected for one camera at a time; its only part.
+
+    exact: whether the order is that camera's, and not one that follows it."""
 
     weights: np.ndarray | None = None
     halved = False
@@ -54,6 +57,7 @@ class Level:
         """rows: of the scene's N Gaussians, that this level draws. gaussians: as it draws them."""
         self.splats = splats
         self.order_key = self.places_key = 0
+        self.exact = False
         self._rows = rows
         self._gaussians = gaussians
         self._changes: tuple[Change, ...] | None = None  # to be brought to the card
@@ -65,24 +69,39 @@ class Level:
     def parts(self) -> "tuple[Level, ...]":
         return (self,)
 
-    def prepare(self, camera: Camera, quick: bool = False) -> None:
+    def prepare(self, camera: Camera, quick: bool = False, late: bool = False) -> None:
         """Order and project the Gaussians, unless they are for this camera and these marks; the same
-        where it is to be quick."""
-        if self._changes is not None:
-            self.splats.place(changed(self._gaussians, self._changes, torch.from_numpy(self._rows)))
-            self._changes = None
-        key = _camera_key(camera)
-        if key != self._camera:
-            self.splats.sort(camera)
+        where it is to be quick.
+
+        Args:
+            late: in an order that may be of a camera some frames before.
+        """
+        self._place()
+        key = camera_key(camera)
+        if key != self._camera or not (late or self.exact):
+            if late:
+                self.exact = self.splats.follow(camera)
+            else:
+                self.splats.sort(camera)
+                self.exact = True
             self._camera, self._projected, self.order_key = key, False, new_name()
         if not self._projected:
             if len(self.splats.order):
                 self.splats.project(camera)
             self._projected, self.places_key = True, new_name()
 
-    def ready(self, camera: Camera, quick: bool = False) -> bool:
-        """As `LayeredLevel.ready`: all that it draws is there."""
-        return True
+    def _place(self) -> None:
+        if self._changes is not None:
+            self.splats.place(changed(self._gaussians, self._changes, torch.from_numpy(self._rows)))
+            self._changes = None
+
+    def ready(self, camera: Camera, quick: bool = False, late: bool = False) -> bool:
+        """As `LayeredLevel.ready`: all that it draws is there but for an order, which is found beside the
+        frames."""
+        self._place()
+        if late or (self.exact and camera_key(camera) == self._camera):
+            return True
+        return self.splats.found(camera)
 
     def mark(self, shown: np.ndarray, tints: np.ndarray) -> None:
         """Bring the scene's marks to this level: shown (N,) bool, tints (N,) uint8."""
@@ -118,9 +137,3 @@ class Level:
 def new_name() -> int:
     """A key that no content has yet."""
     return next(_names)
-
-
-def _camera_key(camera: Camera) -> tuple:
-    pose, K = (m.detach().cpu().double().numpy().tobytes() for m in (camera.viewmat, camera.K))
-    light = None if camera.light is None else camera.light.cpu().numpy().tobytes()
-    return pose, K, camera.width, camera.height, camera.orthographic, light

@@ -60,7 +60,8 @@ class SplatRenderer:
     texture coordinates of a window library, or read them without flipping.
 
     `passes` counts what was drawn: "colour", "weights" (24 atoms each) touch splats, those of every layer on
-    its own; "blend", "norm", "negatives", "query", "show" do not.
+    its own; "blend", "norm", "negatives", "query", "show" do not. `exact`: whether what was drawn last is in
+    its own camera's order.
     """
 
     def __init__(
@@ -90,6 +91,7 @@ class SplatRenderer:
         self._own_canvas = canvas is None
         self._canvas = Canvas(ctx, precision, maps, hardware) if canvas is None else canvas
         self.passes = self._canvas.painter.passes
+        self.exact = True
         self._fill = False
         self._splats = splats
         self._scene: LiveScene | None = None
@@ -115,12 +117,12 @@ class SplatRenderer:
         if self._scene is not None and self._scene.scene is scene:
             self._scene.give(share, thinned, rows)
 
-    def upload(self, camera: Camera, share: float = 1.0, moving: bool = False) -> bool:
-        """Bring what a picture so drawn lacks to the card, one layer of the scene at the most; whether all of
-        it is there."""
+    def upload(self, camera: Camera, share: float = 1.0, moving: bool = False, late: bool = False) -> bool:
+        """Bring what a picture so drawn lacks to the card, one layer of the scene at the most, and find its
+        order beside the frames; whether all of it is there."""
         if self._scene is None:
             return True
-        return self._scene.level(share).ready(camera, self._quick(moving or share < 1))
+        return self._scene.level(share).ready(camera, self._quick(moving or share < 1), late)
 
     def mark(self, shown: np.ndarray, tints: np.ndarray) -> None:
         """Draw only some Gaussians, and some in a tint (`splats.TINTS`); holds until `set_scene`.
@@ -170,6 +172,7 @@ class SplatRenderer:
         fast: bool = False,
         share: float = 1.0,
         moving: bool = False,
+        late: bool = False,
     ) -> None:
         """Draw the scene; nothing is drawn again for the same scene, camera and size.
 
@@ -184,12 +187,15 @@ class SplatRenderer:
                 made once and kept with the scene: use few values.
             moving: the picture is gone in a moment, as one that is `fast` or of a share is: on a processor
                 it is blended of two layers, the farther one in half the size.
+            late: its order may be that of a camera up to two frames before, while the next is found beside
+                (app/gl/ordering.py); `exact` says whether it is.
 
         Raises:
             ValueError: there is no scene, or the image has no pixels.
             GraphicsError: the image is larger than the driver's textures, or the context is gone.
         """
-        scene, level, view = self._prepared(camera, share, self._quick(moving or fast or share < 1))
+        scene, level, view = self._prepared(camera, share, self._quick(moving or fast or share < 1), late)
+        self.exact = level.exact
         drawn = Drawn(view.colour, camera, background, level.places_key, self._fill)
         picture = DrawnPicture(scene, view, drawn, level, fast, level.depth_range)
         if self._question is not None and fast and self._question.fits_fast:
@@ -492,7 +498,7 @@ class SplatRenderer:
     # --- inside -------------------------------------------------------------------------------
 
     def _prepared(
-        self, camera: Camera, share: float, quick: bool = False
+        self, camera: Camera, share: float, quick: bool = False, late: bool = False
     ) -> tuple[LiveScene, Level | LayeredLevel, ViewTargets]:
         """What to draw, sorted and projected, and where.
 
@@ -505,7 +511,7 @@ class SplatRenderer:
             raise ValueError("draw: expected set_scene before, received no scene")
         view = self._canvas.view((camera.width, camera.height))
         level = self._scene.level(share)
-        level.prepare(camera, quick)
+        level.prepare(camera, quick, late)
         return self._scene, level, view
 
     def _quick(self, moving: bool) -> bool:

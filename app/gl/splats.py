@@ -24,7 +24,7 @@ _WIDEST = 1e12  # scene units: wider Gaussians are flat over any view, and float
 
 
 class SplatBuffers:
-    """Owns the vertex data of a scene; `sort` chooses and orders, `project` and `expand` fill.
+    """Owns the vertex data of a scene; `sort` or `follow` choose and order, `project` and `expand` fill.
 
     Gaussians with a value or a weight that is not finite are left out, and those
     below opacity 1/255, which no pixel can show. Footprints end where alpha falls below 1/255 and, where
@@ -77,10 +77,9 @@ class SplatBuffers:
         Nothing is uploaded again but one byte a Gaussian. Project after this; whether to sort again,
         because other Gaussians are shown now, is returned.
         """
-        before, self._ordering.shown = self._ordering.shown, shown[self._kept]
         if self.num_gaussians:
             self._vertices.tint(tints[self._kept])
-        return not np.array_equal(before, self._ordering.shown)
+        return self._ordering.show(shown[self._kept])
 
     def place(self, gaussians: Gaussians) -> None:
         """The same Gaussians elsewhere or in other colours: `gaussians` has all N, moved or recoloured.
@@ -99,12 +98,25 @@ class SplatBuffers:
         self._ordering.sort(camera)
         self.draw_in(self._ordering.order)
 
+    def found(self, camera: Camera) -> bool:
+        """Begin to find that order beside the frames; whether `sort` need not wait for it."""
+        return self._ordering.found(camera)
+
+    def follow(self, camera: Camera) -> bool:
+        """As `sort` for one frame of a moving camera, in an order that may be late (`ordering.MOST_BEHIND`);
+        whether it is exact."""
+        before = self.order
+        exact = self._ordering.follow(camera)
+        if self.order is not before:
+            self.draw_in(self._ordering.order)
+        return exact
+
     def draw_in(self, order: np.ndarray) -> None:
         """Draw these rows of the Gaussians kept, the first first."""
         self._ordering.order = np.ascontiguousarray(order, np.uint32)
         self.shapes.forget()
         if len(order):
-            self._order_buffer.write(self.order.tobytes())
+            self._order_buffer.write(self.order)
 
     def active_atoms(self) -> np.ndarray:
         """Atoms (Ka,) that the chosen Gaussians carry with a weight above 0, ascending."""

@@ -15,7 +15,9 @@ from .layout import ATOMS_A_LAYER, ATOMS_A_PASS, LAYERS_A_PASS, num_layers
 from .level import Prepared
 from .painter import Painter
 from .splats import SplatBuffers
-from .targets import PREMULTIPLIED, Layers, LayerTarget, drawing, read
+from .targets import NUMPY_TYPES, PREMULTIPLIED, Layers, LayerTarget, drawing
+
+_ROWS_AT_ONCE = 8  # of pixels, to be read: a megabyte or two, which stay in a core's cache
 
 
 @dataclass(frozen=True)
@@ -38,12 +40,16 @@ class Maps:
 
     def read(self, num_atoms: int) -> np.ndarray:
         """(H, W, K) float32; 0 for atoms out of view."""
-        width, height, _ = self.array.size
+        width, height, count = self.array.size
         maps = np.zeros((height, width, num_atoms), np.float32)
-        if len(self.atoms):
-            layers = read(self.array).reshape(-1, height, width, 4)[..., :ATOMS_A_LAYER]
-            flat = np.moveaxis(layers, 0, 2).reshape(height, width, -1)
-            maps[..., self.atoms] = flat[..., : len(self.atoms)]
+        if not len(self.atoms):
+            return maps
+        texels = np.frombuffer(self.array.read(), NUMPY_TYPES[self.array.dtype])
+        layers = texels.reshape(count, height, width, 4)[: self.num_layers, ..., :ATOMS_A_LAYER]
+        for first in range(0, height, _ROWS_AT_ONCE):
+            some = slice(first, first + _ROWS_AT_ONCE)
+            flat = np.moveaxis(layers[:, some], 0, 2).reshape(-1, width, ATOMS_A_LAYER * self.num_layers)
+            maps[some][..., self.atoms] = flat[..., : len(self.atoms)]
         return maps
 
     def pixel(self, x: int, y: int, num_atoms: int) -> np.ndarray:

@@ -29,7 +29,7 @@ from .scene.commands import JobCancelled, JobFailed, Loaded, Progressed
 
 log = logging.getLogger(__name__)
 
-AHEAD = ("langflash_core.pipeline", "scipy.spatial.transform")
+AHEAD = ("langflash_core.pipeline", "langflash_core.reconstruction.stages", "scipy.spatial.transform")
 """What the first reconstruction and the first turn of a thing import, in this order."""
 IDLE = 0.5  # seconds without a request until the next of them is imported
 SAVING_SECONDS = 60.0  # that `stop` waits at the most for what a person asked to be saved

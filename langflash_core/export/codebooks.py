@@ -7,7 +7,6 @@ Source: Lloyd, "Least squares quantization in PCM", 1982.
 
 import numpy as np
 import torch
-from scipy.spatial import KDTree
 
 _SCALAR_STEPS, _VECTOR_STEPS = 24, 5
 _SAMPLE = 16  # vectors per centre that the steps look at
@@ -61,6 +60,8 @@ def _nearest(points: torch.Tensor, centres: torch.Tensor) -> torch.Tensor:
     Distances share one buffer: made anew for each part, they left gigabytes of holes between small results.
     """
     if points.shape[1] <= _FEW and bool(points.isfinite().all()):  # a tree refuses what is no number
+        from scipy.spatial import KDTree  # a quarter of a second, which a question has not to wait for
+
         return torch.from_numpy(KDTree(centres.numpy()).query(points.numpy())[1])
     norms = (centres**2).sum(1)
     step = max(1, _PAIRS_AT_ONCE // len(centres))

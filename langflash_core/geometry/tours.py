@@ -2,8 +2,6 @@
 
 import numpy as np
 import torch
-from scipy.interpolate import CubicSpline, PchipInterpolator
-from scipy.spatial.transform import Rotation, RotationSpline
 
 from langflash_core.types import Camera
 
@@ -22,6 +20,9 @@ def along(cameras: list[Camera], times: list[float], size: tuple[int, int] | Non
 
     Speeds are continuous. Source: of the rotations, scipy's RotationSpline.
     """
+    from scipy.interpolate import CubicSpline, PchipInterpolator  # .1 s, which a picture has not to wait for
+    from scipy.spatial.transform import Rotation, RotationSpline
+
     width, height = even(size or (cameras[0].width, cameras[0].height))
     sized = [camera.resized(width, height) for camera in cameras]
     turns = np.stack([camera.viewmat[:3, :3].double().numpy() for camera in sized])

@@ -13,9 +13,6 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 import torch
 from jaxtyping import Bool, Float, Int
-from scipy.ndimage import distance_transform_edt, maximum_filter, minimum_filter, uniform_filter
-from scipy.sparse import coo_matrix
-from scipy.sparse.csgraph import connected_components
 from torch import Tensor
 
 from langflash_core.language.answers import COVERED_ALPHA, MIN_AREA, world_points
@@ -262,6 +259,8 @@ class _View:
 
     @staticmethod
     def of(frame: Frame, camera: Camera, up: Float[np.ndarray, "3"]) -> "_View":
+        from scipy.ndimage import uniform_filter  # .3 s with all of scipy, for what only few phrases ask
+
         height, width = frame.alphas.shape
         step = max(1, round(max(height, width) / SIDE))
         some = slice(step // 2, None, step)
@@ -291,6 +290,10 @@ class _View:
     def parts(self, members: Bool[np.ndarray, " n"]) -> Int[np.ndarray, " n"]:
         """Numbers of what is connected in the grid, -1 of others; neighbours are up to eight. Edges, where
         depths are between those of two things, are none where something is as thick as three."""
+        from scipy.ndimage import maximum_filter, minimum_filter
+        from scipy.sparse import coo_matrix
+        from scipy.sparse.csgraph import connected_components
+
         inside = np.zeros(self.shown.shape, bool)
         inside[self.shown] = members
         numbers = np.arange(inside.size).reshape(inside.shape)
@@ -311,6 +314,8 @@ class _View:
 
     def spread(self, choice: Choice) -> Bool[Tensor, "H W"]:
         """Pixels whose nearest thing in the picture is one that is meant."""
+        from scipy.ndimage import distance_transform_edt
+
         owner = np.zeros(self.shown.shape, np.int8)
         flat = np.zeros(len(self.points), np.int8)
         for value, things in ((1, choice.dropped), (2, choice.kept)):  # parts of a thing go before the thing

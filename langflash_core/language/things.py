@@ -9,7 +9,6 @@ from functools import cached_property
 
 import numpy as np
 from jaxtyping import Float, Integer
-from scipy.spatial import KDTree
 
 RIGHT, UP, AWAY = 0, 1, 2
 _ENDS = (0.05, 0.95)  # quantiles of points that are a thing's ends: edges bleed in depth
@@ -122,12 +121,16 @@ def related(thing: Thing, relation: str, others: list[list[Thing]]) -> bool:
 
 def gap(thing: Thing, others: list[Thing]) -> float:
     """Distance from a thing's points to the nearest of some others."""
+    from scipy.spatial import KDTree  # a quarter of a second, which a plain phrase has not to wait for
+
     return float(KDTree(together(others)).query(thing.points)[0].min())
 
 
 def _on(thing: Thing, places: Float[np.ndarray, "n 3"]) -> bool:
     """Touching it: from above where that lies level, flush with it where it stands, either where it is none
     of both, as a sofa; and near below a ceiling."""
+    from scipy.spatial import KDTree
+
     distances = KDTree(thing.points).query(places)[0]
     if _hangs(thing, places):
         return True

@@ -28,6 +28,7 @@ vec3 coefficient(int base) {
 #define RADIUS CUT
 #endif
 
+const float NEAR = 0.005;  // half of what is chosen: behind it is only what a late order brings along
 const float HALF_MAX = 65504.0;  // of float16: sums of T alpha c stay finite in every target
 
 uniform mat4 viewmat;      // world to camera
@@ -55,6 +56,10 @@ void main() {
     vec2 centre = pos_c.xy / (orthographic ? 1.0 : pos_c.z);
     out_place = vec4(centre * pinhole.xy + pinhole.zw, in_mean.w, pos_c.z);
     out_shape = vec4(root, RADIUS);
+    if (pos_c.z < NEAR) {  // beside any image
+        out_place.xy = vec2(-1e6);
+        out_shape = vec4(1.0, 0.0, 1.0, 0.0);
+    }
     vec3 direction = orthographic ? transpose(mat3(viewmat))[2] : normalize(from_eye);
     out_colour = clamp((sh_colour(direction) - light_offset) / light_gain, 0.0, HALF_MAX);
     int tint = int(255.0 * in_tint + 0.5);

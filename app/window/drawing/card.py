@@ -40,11 +40,12 @@ class CardPicture:
         still = state.now - max(stand.moved, touched)
         resting = self.governor.resting(kind, still)
         wanted = self.easel.wanted(state, stand, resting or self.governor.moving(kind))
-        if not self.easel.covers(wanted):
-            if not self.easel.ready(wanted, moving=resting is None):
+        moving = resting is None
+        if not self.easel.covers(wanted, late=moving):
+            if not self.easel.ready(wanted, moving, late=moving):
                 return 0.0
-            self.easel.draw(wanted, moving=resting is None)
-            self.governor = self.governor.learn(wanted.plan, self.easel.seconds, moving=resting is None)
+            self.easel.draw(wanted, moving, late=moving)
+            self.governor = self.governor.learn(wanted.plan, self.easel.seconds, moving)
         self.easel.paint(state)
         return self.governor.next_rest(still)
 

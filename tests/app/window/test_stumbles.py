@@ -40,7 +40,7 @@ from app.window.worker import Worker
 from langflash_core import outputs
 from langflash_core.network.guided import GuidedDepthNet
 from langflash_core.network.pointmaps import PointMapNet
-from langflash_core.pipeline import STAGES
+from langflash_core.reconstruction.stages import STAGES
 from langflash_core.scene.edited import first_marks
 from langflash_core.scene.edits import History
 from langflash_core.scene.mask import Mask
