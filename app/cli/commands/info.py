@@ -71,6 +71,7 @@ def _for_people(document: dict[str, Any]) -> dict[str, Any]:
         "pruning": _pruned(document["pruning"]),
         "antialiased": document["antialiased"] or "",
         "layers": document["layers"] or "",
+        "foreseen": "",  # a warning says what it means
     }
     world = world_from_json(document["world"]) if document["world"] else None
     lines["world"] = world_line(world, document["metric_scale"])

@@ -1,5 +1,6 @@
 """The photos in the tray, the scene made of them, and what of it the picture shows."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -133,7 +134,7 @@ class SceneInfo:
     memory: of what was computed about it last; goes on with the same scene.
     own_views: whether it says which photo made which Gaussian, so that photos can be compared.
     extent: corners (low, high) of the box around nearly all of it, world axes, scene units. above: the map.
-    lenses: those that its photos told.
+    lenses: those that its photos told. doubts: of photos that do not look right what is wrong and what helps.
     """
 
     serial: int
@@ -150,6 +151,7 @@ class SceneInfo:
     extent: tuple[Vector, Vector] | None = None
     above: "Above | None" = field(default=None, compare=False, repr=False)
     lenses: tuple[FoundLens, ...] = ()
+    doubts: Mapping[int, str] = field(default_factory=dict, compare=False)
     memory: SceneMemory = field(default=None, compare=False, repr=False)  # type: ignore[assignment]
 
     def __post_init__(self) -> None:
