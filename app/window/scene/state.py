@@ -197,7 +197,8 @@ class Showing:
     stood at, if any. compare: where the photo begins, 0 to 1 across the picture; None: not compared.
     unfinished: photos on which work was begun and kept. taken_out: what the tray had before.
     unhidden: the scene on show as it was before something in it was hidden for good, until that is saved;
-    shown_by: files of scenes that show what was hidden in it by then.
+    shown_by: files of scenes that show what was hidden in it by then. mute: the scene on show as it was
+    before it was taught phrases.
     """
 
     photos: tuple[Photo, ...] = ()
@@ -214,6 +215,7 @@ class Showing:
     compare: float | None = None
     unhidden: Room | None = None
     shown_by: tuple[Path, ...] = ()
+    mute: Room | None = None
     job: Job | None = None
     unfinished: tuple[Path, ...] = ()
     taken_out: TakenOut | None = None

@@ -156,7 +156,7 @@ def describe_scene(scene: "Scene", serial: int, name: str, path: Path | None = N
     from langflash_core.types import NO_LANGUAGE
 
     mute = scene.semantics.space == NO_LANGUAGE
-    said = ("This splat file holds no language: phrases find nothing in it.",) if mute else ()
+    said = ("This file cannot answer phrases yet; teach it some, beside the phrases.",) if mute else ()
     means = scene.gaussians.means.double().numpy()
     views = []
     for viewmat, K in zip(scene.viewmats.double().numpy(), scene.Ks.double().numpy(), strict=True):
