@@ -22,13 +22,13 @@ from langflash_core.images.views import source_picture, source_size
 from langflash_core.running import Progress
 from langflash_core.scene.assemble import placed_views
 from langflash_core.scene.detailed import assemble_detailed, working_photo, working_size
-from langflash_core.scene.foreseen import foresight
 from langflash_core.scene.light import Light, photo_light
 from langflash_core.scene.prune import prune
 from langflash_core.scene.report import left_out_line
 from langflash_core.scene.strangers import strangers
 from langflash_core.splat.colours import ROUNDS, solved_colours
 from langflash_core.splat.compose import Nearness
+from langflash_core.splat.foreseen import foresight
 from langflash_core.types import Cost, Prediction, Scene, Views
 
 _HELD = 8  # photos that stay decoded

@@ -187,7 +187,7 @@ class Record:
     `shares`, of each view what was left out since the others do not show it (`scene.strangers`), `unplaced`,
     names of photos that could not be placed, and `films`, each with its name (`film`), how many `frames` were
     looked at, and what became of those that were not taken, `why` (phrases to counts). foreseen: `covered`,
-    `alike` and `nearest`, a number for each view, as `scene.foreseen` has them. world: where
+    `alike` and `nearest`, a number for each view, as `splat.foreseen` has them. world: where
     it stands; None: nobody looked. thing_names: a person's own, by what the inventory calls a thing.
     calibration: what the network's checkpoint says about scores, instead of its language space. atom_names:
     a person's own, by atom, which it answers to. atom_denials: what a person said that an atom is not.

@@ -17,7 +17,7 @@ from langflash_core.geometry.cameras import (
 )
 from langflash_core.geometry.rotations import matrix
 from langflash_core.scene.doubts import ALONE, TORN
-from langflash_core.scene.foreseen import CELL, Foresight, _pointed, foresight
+from langflash_core.splat.foreseen import CELL, Foresight, _pointed, foresight
 from langflash_core.types import Camera
 
 VIEWS, WIDTH, HEIGHT = 4, 120, 90
