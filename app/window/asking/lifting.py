@@ -22,7 +22,7 @@ TEACHING = "Teaching it to answer phrases"
 """Title of the job."""
 CANNOT = "This file cannot answer phrases yet."
 ABOUT = "about 30 s"
-"""On two processor cores, of a scene of 120,000 Gaussians."""
+"""Without a graphics card: 345,000 Gaussians take 25 s of one core, and the network is read before."""
 
 
 def can_learn(state: State) -> bool:
