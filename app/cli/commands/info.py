@@ -110,6 +110,8 @@ def _lines(fields: dict[str, Any], indent: str = "") -> list[str]:
         label = f"{indent}{name.replace('_', ' ')}:"
         if isinstance(value, dict):
             lines += [label, *_lines(value, indent + "  ")] if value else []
+        elif name == "warnings" and value:  # sentences, with commas in them
+            lines += [f"{indent}warning: {each}" for each in value]
         else:
             lines.append(f"{label} {_plain(value)}")
     return lines
