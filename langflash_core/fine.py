@@ -28,6 +28,7 @@ from langflash_core.scene.report import left_out_line
 from langflash_core.scene.strangers import strangers
 from langflash_core.splat.colours import ROUNDS, solved_colours
 from langflash_core.splat.compose import Nearness
+from langflash_core.splat.foreseen import foresight
 from langflash_core.types import Cost, Prediction, Scene, Views
 
 _HELD = 8  # photos that stay decoded
@@ -94,8 +95,9 @@ def covered_scene(
         preset=preset,
         progress=lambda done: progress("elements", 0.1 + 0.3 * done),
     )
+    foreseen = _foreseen(prediction, views)
     timings = {**prediction.timings, "assembly": time.perf_counter() - start}
-    return Covered(scene.with_record(cost=Cost(timings)), whole, left, light)
+    return Covered(scene.with_record(foreseen=foreseen, cost=Cost(timings)), whole, left, light)
 
 
 @torch.no_grad()
@@ -174,6 +176,13 @@ class _Silent(Sequence[Tensor]):
     def size(self, index: int) -> tuple[int, int]:
         """(width, height) of one."""
         return self._photos.size(index)
+
+
+def _foreseen(prediction: Prediction, views: Views) -> dict[str, list]:
+    """What a record says of how much of each photo its neighbours foresee: nothing of a single one."""
+    if views.num_views < 2:
+        return {}
+    return foresight(views.images, prediction.depths, prediction.viewmats, views.Ks).stored()
 
 
 def _shares(left: Tensor) -> dict[str, list[float]]:

@@ -3,13 +3,15 @@
     views (of the scene itself, or photos with poses) -> network: w_k(x) per view and one dictionary
     -> w_ik = sum c_ip w_k(p) / sum c_ip, with c_ip what Gaussian i adds to pixel p (`splat.backprojection`)
 
-Nothing is trained. What no view shows takes the weights of the nearest Gaussian that one does.
+Nothing is trained. What no view shows takes the weights of the nearest Gaussian that one does. Views of the
+scene itself are from where people would stand (`scene.lookouts`).
 """
 
 import io
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -30,16 +32,15 @@ from langflash_core.network import PRESETS, load_network
 from langflash_core.network.posed import posed_semantics
 from langflash_core.records import Shift
 from langflash_core.scene.assemble import sparse_weights
-from langflash_core.scene.bare import framing_camera
+from langflash_core.scene.lookouts import lookouts
 from langflash_core.splat import render as render_reference
 from langflash_core.splat.backprojection import gathered
 from langflash_core.splat.compose import Nearness, shares
-from langflash_core.types import Camera, Frame, Gaussians, Scene, Semantics, Views
+from langflash_core.types import Camera, Frame, Scene, Semantics, Views
 
 PRESET = "mini"
 VIEWS = 8  # what the network was shaped for
-_CLOSER = 0.85  # of the framing camera's distance: things fill more of each view
-_ELEVATIONS = (15.0, 35.0)  # degrees above the horizon, in turn
+_SHAPE = (4, 3)  # width to height of a view
 _GREY = 0.5  # behind what a view shows, as behind transparent photos
 _COVERED = 0.5  # alpha from which a pixel speaks of the scene
 _BLUR = 5  # pixels, odd
@@ -57,6 +58,8 @@ UPS = tuple(_TO_DOWN)
 _QUALITY = 88
 Progress = Callable[[str, float], None]
 Renderer = Callable[[Scene, Camera], Frame]
+Sees = Callable[[Views, Tensor, Tensor], tuple[Tensor, Tensor]]
+"""`posed_semantics` of a network: views, poses and depths to weights and a dictionary."""
 
 
 def lift(
@@ -84,37 +87,79 @@ def lift(
         InputError: the photos show nothing of the scene, or the network sees nothing in the views.
         WeightsError: the checkpoint is missing or does not fit. Cancelled: `cancelled()` became true.
     """
-    draw = render or render_reference
-    if photos is None or viewmats is None:
-        cameras = cameras_around(scene, up=up)
-    else:
+    draw, network = render or render_reference, load_network(PRESET, weights, "cpu")
+    told, see = _Telling(progress, cancelled), partial(posed_semantics, network)
+    if photos is not None and viewmats is not None:
         cameras = [Camera(v, K, *photos.size) for v, K in zip(viewmats, photos.Ks, strict=True)]
+        looked = _looked(scene, cameras, photos, draw, see, told)
+        lifted = _spoken(scene, looked, network.calibration)
+        told("done", 1.0)
+        doubt = _doubt(looked.frames, photos)
+        return lifted.with_record(warnings=(*lifted.record.warnings, doubt)) if doubt else lifted
+    looked = _looked(scene, own_cameras(scene, VIEWS, up), None, draw, see, told)
+    told("done", 1.0)
+    return _with_hint(_spoken(scene, looked, network.calibration), up)
+
+
+@dataclass(frozen=True)
+class _Telling:
+    """Tells how far the work is, and ends it once that is wanted."""
+
+    progress: Progress
+    cancelled: Callable[[], bool]
+
+    def __call__(self, step: str, share: float) -> None:
+        _check(self.cancelled)
+        self.progress(step, share)
+
+
+@dataclass(frozen=True)
+class _Looked:
+    """What a network saw: cameras, views and what was drawn of them; sums (N, K) and totals (N,) of what it
+    said of each Gaussian, and its dictionary (K, C)."""
+
+    cameras: Sequence[Camera]
+    views: Views
+    frames: Sequence[Frame]
+    sums: Tensor
+    totals: Tensor
+    dictionary: Tensor
+
+    def shares(self) -> Float[Tensor, "N K"]:
+        """Of each Gaussian, in sum 1 where it is seen."""
+        return self.sums / self.totals.clamp_min(1e-12)[:, None]
+
+
+def _looked(
+    scene: Scene,
+    cameras: Sequence[Camera],
+    photos: Views | None,
+    draw: Renderer,
+    see: Sees,
+    told: _Telling,
+) -> _Looked:
+    """Draw views, have the network look at them, or at photos from their places, and carry that back.
+
+    Raises:
+        InputError: they show nothing of the scene, or the network sees nothing in them.
+    """
     frames = []
     for index, camera in enumerate(cameras):
-        _check(cancelled)
-        progress("drawing", 0.3 * index / len(cameras))
+        told("drawing", 0.3 * index / len(cameras))
         frames.append(draw(scene, camera))
     _check_shown(frames)
     views = photos if photos is not None else own_views(frames, cameras)
-    _check(cancelled)
-    progress("network", 0.3)
-    network = load_network(PRESET, weights, "cpu")
+    told("network", 0.3)
     depths = torch.stack([frame.depths.float() for frame in frames])
     world = torch.stack([camera.viewmat for camera in cameras])
     unit = float(depths[0][depths[0] > 0].mean())
-    relative = world @ invert_rigid(world[0])
-    relative = torch.cat((relative[:, :, :3], relative[:, :, 3:]), -1).clone()
+    relative = (world @ invert_rigid(world[0])).clone()
     relative[:, :3, 3] /= unit
-    maps, dictionary = posed_semantics(network, views, relative, depths / unit)
+    maps, dictionary = see(views, relative, depths / unit)
     if not len(dictionary):
         raise InputError("the network finds no part in these views; give photos that show more of the scene")
-    sums, totals = _carried_back(scene, cameras, maps, frames, draw, progress, cancelled)
-    progress("done", 1.0)
-    lifted = _spoken(scene, views, cameras, sums, totals, dictionary, network.calibration)
-    if photos is None:
-        return _with_hint(lifted, up)
-    doubt = _doubt(frames, views)
-    return lifted.with_record(warnings=(*lifted.record.warnings, doubt)) if doubt else lifted
+    sums, totals = _carried_back(scene, cameras, maps, frames, draw, told)
+    return _Looked(cameras, views, frames, sums, totals, dictionary)
 
 
 def _with_hint(lifted: Scene, up: str) -> Scene:
@@ -153,55 +198,18 @@ def posed_views(poses: Path, photos: Sequence[Path], shift: Shift | None = None)
     return views, viewmats.float()
 
 
-def cameras_around(scene: Scene, count: int = VIEWS, up: str = UP) -> list[Camera]:
-    """Cameras around what `framing_camera` frames, looking at its middle from two heights, upright.
+def own_cameras(scene: Scene, count: int, up: str = UP) -> list[Camera]:
+    """Cameras of at most `count` views of a scene from where people would stand, upright.
 
     Args:
         up: the axis of the scene's world that points up, one of `UPS`.
     """
-    turn = axes_matrix(_TO_DOWN[up])
+    turn, preset = axes_matrix(_TO_DOWN[up]), PRESETS[PRESET]
     upright = replace(scene.gaussians, means=(scene.gaussians.means.double() @ turn.T).float())
     to_upright = torch.eye(4)
     to_upright[:3, :3] = turn
-    return [replace(c, viewmat=c.viewmat @ to_upright) for c in _cameras_around(upright, count)]
-
-
-def _cameras_around(gaussians: Gaussians, count: int) -> list[Camera]:
-    """The same where +y is down."""
-    framing = framing_camera(gaussians)
-    means = gaussians.means[gaussians.opacities >= 0.1]
-    means = means if len(means) else gaussians.means
-    step = max(1, len(means) // 100_000)
-    pose = invert_rigid(framing.viewmat.double())
-    eye, forward = pose[:3, 3], pose[:3, 2]
-    ahead = float((means[::step].double().median(0).values - eye) @ forward)
-    middle, distance = eye + ahead * forward, _CLOSER * ahead
-    size = fitting_size(framing.width, framing.height, PRESETS[PRESET].native_area, PRESETS[PRESET].patch)
-    cameras = []
-    for index in range(count):
-        azimuth = 2 * math.pi * index / count
-        elevation = math.radians(_ELEVATIONS[index % len(_ELEVATIONS)])
-        away = torch.tensor(
-            [
-                math.sin(azimuth) * math.cos(elevation),
-                -math.sin(elevation),
-                -math.cos(azimuth) * math.cos(elevation),
-            ],
-            dtype=torch.float64,
-        )
-        cameras.append(_looking(middle + distance * away, middle, framing, size))
-    return cameras
-
-
-def _looking(eye: Tensor, at: Tensor, like: Camera, size: tuple[int, int]) -> Camera:
-    """A camera at `eye` that looks `at` a point, upright, with the lens of another."""
-    forward = torch.nn.functional.normalize(at - eye, dim=0)
-    down = torch.tensor([0.0, 1.0, 0.0], dtype=torch.float64)
-    right = torch.nn.functional.normalize(torch.linalg.cross(down, forward), dim=0)
-    rotation = torch.stack((right, torch.linalg.cross(forward, right), forward))
-    viewmat = torch.eye(4, dtype=torch.float64)
-    viewmat[:3, :3], viewmat[:3, 3] = rotation, -rotation @ eye
-    return Camera(viewmat.float(), like.K, like.width, like.height).resized(*size)
+    size = fitting_size(*_SHAPE, preset.native_area, preset.patch)
+    return [replace(c, viewmat=c.viewmat @ to_upright) for c in lookouts(upright, count, size)]
 
 
 def own_views(frames: Sequence[Frame], cameras: Sequence[Camera]) -> Views:
@@ -232,7 +240,7 @@ def _check_shown(frames: Sequence[Frame]) -> None:
     InputError: the first view, or most of them, show nothing.
     """
     shown = [float((frame.alphas >= _COVERED).float().mean()) for frame in frames]
-    if not shown[0] or sum(share > 0.02 for share in shown) * 2 <= len(shown):
+    if not shown or not shown[0] or sum(share > 0.02 for share in shown) * 2 <= len(shown):
         raise InputError(
             "the views show almost nothing of the scene; check that the poses are in its world and its unit"
         )
@@ -288,15 +296,13 @@ def _carried_back(
     maps: Tensor,
     frames: Sequence[Frame],
     draw: Renderer,
-    progress: Progress,
-    cancelled,
+    told: _Telling,
 ) -> tuple[Tensor, Tensor]:
     """Sums (N, K) and totals (N,) over all views."""
     sums = torch.zeros(len(scene.gaussians), maps.shape[1])
     totals = torch.zeros(len(scene.gaussians))
     for index, (camera, values, frame) in enumerate(zip(cameras, maps, frames, strict=True)):
-        _check(cancelled)
-        progress("carrying back", 0.6 + 0.4 * index / len(cameras))
+        told("carrying back", 0.6 + 0.4 * index / len(cameras))
         trust = (frame.alphas >= _COVERED).float()
         for rows, counts in _pictured(scene, camera, draw):
             some = scene.gaussians.rows(rows)
@@ -320,15 +326,16 @@ def _pictured(scene: Scene, camera: Camera, draw: Renderer) -> list[tuple[Tensor
     return list(zip(rows, shares(alphas.cpu(), depths.cpu(), chosen.weights), strict=True))
 
 
-def _spoken(
-    scene: Scene, views: Views, cameras: Sequence[Camera], sums: Tensor, totals: Tensor, dictionary: Tensor,
-    calibration: dict,
-) -> Scene:  # fmt: skip
-    """The scene with its language."""
-    seen = totals >= _SEEN
+def _spoken(scene: Scene, looked: _Looked, calibration: dict) -> Scene:
+    """The scene with its language.
+
+    Raises:
+        InputError: no view shows anything of it.
+    """
+    seen = looked.totals >= _SEEN
     if not bool(seen.any()):
         raise InputError("no view shows a Gaussian of the scene; check the poses")
-    ids, values = sparse_weights(sums / totals.clamp_min(1e-12)[:, None], _TOP)
+    ids, values = sparse_weights(looked.shares(), _TOP)
     hidden = (~seen).nonzero()[:, 0]
     if len(hidden):
         rows = seen.nonzero()[:, 0]
@@ -339,15 +346,15 @@ def _spoken(
     plain = scene.with_record(atom_names={}, atom_denials={}, silent_atoms=(), lone_atoms=())
     told = {"preset": PRESET, "calibration": dict(calibration)}
     counts = {**scene.record.counts, "seen": int(seen.sum())}
-    spoken = replace(plain, semantics=Semantics(ids, values, dictionary, PRESETS[PRESET].space))
+    spoken = replace(plain, semantics=Semantics(ids, values, looked.dictionary, PRESETS[PRESET].space))
     if scene.layered:
         return spoken.with_record(**told, counts=counts)
     lifted = replace(
         spoken,
-        viewmats=torch.stack([camera.viewmat.float() for camera in cameras]),
-        Ks=views.Ks.float(),
-        view_size=views.size,
-        photos=views.sources,
+        viewmats=torch.stack([camera.viewmat.float() for camera in looked.cameras]),
+        Ks=looked.views.Ks.float(),
+        view_size=looked.views.size,
+        photos=looked.views.sources,
         view_ids=None,
     )
-    return lifted.with_record(**told, counts=counts, photos=tuple(views.names), light={})
+    return lifted.with_record(**told, counts=counts, photos=tuple(looked.views.names), light={}, foreseen={})

@@ -186,7 +186,8 @@ class Record:
     `found`, a mapping of `FoundLens` for each lens that the photos told. left_out:
     `shares`, of each view what was left out since the others do not show it (`scene.strangers`), `unplaced`,
     names of photos that could not be placed, and `films`, each with its name (`film`), how many `frames` were
-    looked at, and what became of those that were not taken, `why` (phrases to counts). world: where
+    looked at, and what became of those that were not taken, `why` (phrases to counts). foreseen: `covered`,
+    `alike` and `nearest`, a number for each view, as `splat.foreseen` has them. world: where
     it stands; None: nobody looked. thing_names: a person's own, by what the inventory calls a thing.
     calibration: what the network's checkpoint says about scores, instead of its language space. atom_names:
     a person's own, by atom, which it answers to. atom_denials: what a person said that an atom is not.
@@ -212,6 +213,7 @@ class Record:
     light: Mapping[str, Any] = field(default_factory=dict)
     lens: Mapping[str, Any] = field(default_factory=dict)
     left_out: Mapping[str, Any] = field(default_factory=dict)
+    foreseen: Mapping[str, Any] = field(default_factory=dict)
     world: World | None = None
     thing_names: Mapping[str, str] = field(default_factory=dict)
     calibration: Mapping[str, Any] = field(default_factory=dict)

@@ -40,6 +40,8 @@ from langflash_core.types import Scene, Segments
 OPENINGS = ("door", "window")
 LEAST_SHARE = 0.003
 """Of a photo: what no photo shows so large is no thing of an inventory."""
+LEAST_SIZE = 0.05  # m, of the second of a thing's three extents: what is smaller is a crumb or a line
+_OVER = 0.1  # m over the ceiling, from which on nothing stands in the room: depth there errs with its height
 SEEN = 0.0005  # of a photo that shows a thing
 _SAVES = 0.12
 _TURNS = np.radians(np.arange(0.0, 90.0, 3.0))
@@ -128,6 +130,19 @@ class Inventory:
     def metre(self) -> float:
         """One in `unit`; of a scene without a scale, by how far its surface spreads in rooms."""
         return 1.0 if self.unit == "m" else float(self.stands[:, [0, 2]].std() / 1.2)
+
+    @cached_property
+    def top(self) -> float:
+        """Height over the floor up to which there is a room, in `unit`: its ceiling; endless where none is
+        seen."""
+        ceilings = np.array([kind == "ceiling" for kind in (*self.parts.kinds, "")])[self.parts.numbers]
+        heights = -self.stands[ceilings, 1]
+        return float(np.nanmedian(heights)) + _OVER * self.metre if len(heights) else math.inf
+
+    def holds(self, thing: Thing) -> bool:
+        """Whether a thing has a size, and a place in the room: not over its ceiling nor under its floor."""
+        sized = sorted(thing.size)[1] >= LEAST_SIZE * self.metre
+        return sized and thing.bottom < self.top and thing.bottom + thing.size[2] > 0
 
     @cached_property
     def numbers(self) -> Integer[np.ndarray, " M"]:
@@ -240,7 +255,9 @@ def _things(whole: Inventory, threshold: float | None, least: float) -> tuple[Th
     for number in sorted(chosen, key=lambda n: (n not in told, large.index(n))):  # so no number changes
         kind = parts.kinds[number]
         id = f"{kind} {1 + sum(thing.kind == kind for thing in things)}"
-        things.append(_thing(whole, id, kind, sure[number], rows[number], areas, seen[:, number]))
+        found = _thing(whole, id, kind, sure[number], rows[number], areas, seen[:, number])
+        if whole.holds(found):
+            things.append(found)
     return tuple(sorted(things, key=lambda thing: -max(thing.shares)))
 
 

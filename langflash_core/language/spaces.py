@@ -90,8 +90,8 @@ def language_space(name: str = "minilm") -> LanguageSpace:
     """
     if name == NO_LANGUAGE:
         raise PromptError(
-            "this scene came from a splat file, which holds shapes and colours but no language, so it "
-            "answers no phrases; make a scene from photos with langflash reconstruct"
+            "this splat file holds no language, so it answers no phrases yet; teach it some with "
+            "langflash lift FILE -o SCENE.langflash, and ask that scene"
         )
     try:
         return _SPACES[name]

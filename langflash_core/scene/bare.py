@@ -10,6 +10,7 @@ many and wide in captured scenes, and must not push the camera away.
 import math
 
 import torch
+from jaxtyping import Float, Integer
 from torch import Tensor
 
 from langflash_core.geometry.cameras import intrinsics_from_fov
@@ -55,12 +56,26 @@ def bare_scene(gaussians: Gaussians, source: str, warnings: tuple[str, ...] = ()
 
 def framing_camera(gaussians: Gaussians) -> Camera:
     """A camera of `VIEW_SIZE` that shows most of the Gaussians, N >= 1."""
-    step = max(1, len(gaussians) // _MOST)
-    seen = gaussians.opacities[::step] >= _SEEN
-    rows = seen if bool(seen.any()) else torch.ones_like(seen)
-    means = gaussians.means[::step][rows].double().cpu()
-    widths = gaussians.scales[::step][rows].double().cpu().amax(-1)
+    rows = seen_rows(gaussians)
+    means = gaussians.means[rows].double().cpu()
+    widths = gaussians.scales[rows].double().cpu().amax(-1)
     return _from_origin(means) or _from_outside(means, float(widths.median()))
+
+
+def seen_rows(gaussians: Gaussians) -> Integer[Tensor, " n"]:
+    """Numbers of some Gaussians that one sees, at most `_MOST`, evenly chosen; n >= 1."""
+    rows = torch.arange(0, len(gaussians), max(1, len(gaussians) // _MOST))
+    seen = (gaussians.opacities[rows] >= _SEEN).cpu()
+    return rows[seen] if bool(seen.any()) else rows
+
+
+def middle_box(means: Float[Tensor, "n 3"]) -> tuple[Float[Tensor, " 3"], Float[Tensor, " 3"]]:
+    """Two corners of what lies around the median: floaters and far backgrounds are outside."""
+    middle = means.quantile(0.5, dim=0)
+    reach = _DEVIATIONS * (means - middle).abs().quantile(0.5, dim=0)
+    ordered = means.sort(dim=0).values
+    low = torch.maximum(middle - reach, ordered[round(0.01 * (len(means) - 1))])
+    return low, torch.minimum(middle + reach, ordered[round(0.99 * (len(means) - 1))])
 
 
 def _from_origin(means: Tensor) -> Camera | None:
@@ -85,11 +100,7 @@ def in_one_cone(means: Tensor) -> bool:
 
 def _from_outside(means: Tensor, width: float) -> Camera:
     """Ahead of the middle box of means (n, 3), which is never thinner than their median `width`."""
-    middle = means.quantile(0.5, dim=0)
-    reach = _DEVIATIONS * (means - middle).abs().quantile(0.5, dim=0)
-    ordered = means.sort(dim=0).values
-    low = torch.maximum(middle - reach, ordered[round(0.01 * (len(means) - 1))])
-    high = torch.minimum(middle + reach, ordered[round(0.99 * (len(means) - 1))])
+    low, high = middle_box(means)
     centre = (low + high) / 2
     half = _MARGIN * ((high - low) / 2).clamp_min(3 * width)
     sine, cosine = math.sin(_ELEVATION), math.cos(_ELEVATION)

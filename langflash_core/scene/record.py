@@ -13,7 +13,9 @@ from langflash_core.scene.tour import read_tour, told_tour
 _COST = ("timings", "seconds", "peak_memory_mb")
 _VERSION_1 = "gaussians_per_view"  # a tensor since
 _TEXTS = ("photos", "warnings")
-_MAPPINGS = ("counts", "pruning", "refinement", "detail", "light", "lens", "left_out", "calibration")
+_MAPPINGS = (
+    "counts", "pruning", "refinement", "detail", "light", "lens", "left_out", "foreseen", "calibration",
+)  # fmt: skip
 _PLAIN: dict[str, tuple[type, ...]] = {
     "preset": (str,),
     "source": (str,),

@@ -8,6 +8,7 @@ import numpy as np
 
 from langflash_core.records import FoundLens, Guess, Record, World, check_light, world_to_json
 from langflash_core.scene.container import damaged, read_container
+from langflash_core.scene.doubts import told_warnings
 from langflash_core.scene.record import from_json
 from langflash_core.scene.tour import read_tour
 
@@ -31,8 +32,8 @@ def describe(scene: "Scene") -> dict:
         (None, or as `Record` has it), counts,
         pruning (as `prune` left it, with `psnr_db` and `relevance_error` where they were measured),
         refinement (None, or kept, held_out and the PSNR before and after), detail (None, or as `Record` has
-        it), light (None, or gains and offsets, a row of red, green and blue per view), lens and left_out
-        (None, or as `Record` has them),
+        it), light (None, or gains and offsets, a row of red, green and blue per view), lens, left_out and
+        foreseen (None, or as `Record` has them),
         tour (None, or the names of stops, how many notes, and the start), timings {stage: seconds, total}
         (None where they are not known, as in files), warnings`.
     """
@@ -241,8 +242,9 @@ def _document(
         "lens": dict(known.lens) or None,
         "tour": _tour(known),
         "left_out": dict(known.left_out) or None,
+        "foreseen": dict(known.foreseen) or None,
         "timings": {**timings, "total": sum(timings.values())} if timings else None,
-        "warnings": list(known.warnings),
+        "warnings": list(told_warnings(known, len(arrays["viewmats"]))),
     }
 
 

@@ -10,7 +10,19 @@ import torch
 from langflash_core.errors import InputError, PromptError
 from langflash_core.inventory import inventory
 from langflash_core.inventory.things import upright_box
-from tests.boxroom import CHAIRS, EYE, METRES, TABLE, box_room, in_layers, without_language
+from langflash_core.scene.joining import appended
+from langflash_core.scene.world import turn_of
+from tests.boxroom import (
+    CHAIRS,
+    EYE,
+    HIGH,
+    METRES,
+    TABLE,
+    WORDS,
+    box_room,
+    in_layers,
+    without_language,
+)
 
 
 @pytest.fixture(scope="module")
@@ -125,3 +137,38 @@ def test_a_box_turns_where_that_saves_room():
 def test_one_point_has_a_box_of_no_size():
     place, size, _, bottom = upright_box(np.array([[1.0, -2.0, 3.0]]))
     assert place == (1.0, -2.0, 3.0) and size == (0.0, 0.0, 0.0) and bottom == 2.0
+
+
+def with_more(room, points: np.ndarray, word: str):
+    """The room with flat Gaussians (n, 3) of one word more, in metres east, height, north of it."""
+    like = room.semantics.weight_ids[:, 0] == WORDS.index(word)
+    rows = like.nonzero()[:1, 0].repeat(len(points))
+    some, whole = room.rows(rows), inventory(room)
+    stands = np.stack((points[:, 0] - EYE[0], -points[:, 1], points[:, 2] - EYE[2]), 1)
+    places = stands / whole.scale @ turn_of(whole.world) + np.array(whole.world.origin)
+    moved = replace(some.gaussians, means=torch.from_numpy(places).float())
+    return appended(room, replace(some, gaussians=moved))
+
+
+def test_a_line_is_no_thing(room):
+    rng, chairs = np.random.default_rng(0), []
+    for extent in ((0.9, 0.01, 0.01), (0.6, 0.6, 0.6)):
+        more = with_more(room, np.array((1.6, 1.2, 2.0)) + rng.uniform(size=(600, 3)) * extent, "chair")
+        chairs.append(inventory(more, threshold=0.0, least=0.0).counts["chair"])
+    assert chairs == [2, 3]
+
+
+def test_a_thing_has_a_size_and_a_place_in_the_room():
+    found = inventory(box_room(pitch=0.0).with_record(metric_scale=METRES))  # the ceiling is in view
+    (table,) = (thing for thing in found.things if thing.kind == "table")
+    assert found.top == pytest.approx(HIGH + 0.1, abs=0.1)
+    assert found.holds(table) and found.holds(replace(table, size=(0.9, 0.5, 0.01)))  # a picture
+    assert found.holds(replace(table, bottom=HIGH - 0.3))  # a lamp
+    assert not found.holds(replace(table, size=(0.9, 0.04, 0.01)))
+    assert not found.holds(replace(table, bottom=HIGH + 0.3))
+    assert not found.holds(replace(table, bottom=-0.9, size=(0.8, 0.8, 0.3)))
+
+
+def test_without_a_ceiling_nothing_is_too_high(room):
+    below = room.rows(room.semantics.weight_ids[:, 0] != WORDS.index("ceiling"))
+    assert math.isinf(inventory(below).top)

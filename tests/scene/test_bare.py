@@ -81,6 +81,6 @@ def test_it_is_a_scene_like_others(tmp_path):
 
 
 def test_it_answers_no_phrase_and_says_so():
-    with pytest.raises(PromptError, match="langflash reconstruct") as caught:
+    with pytest.raises(PromptError, match=r"langflash lift FILE -o SCENE\.langflash") as caught:
         language_space(bare_scene(splats(ball(5)), "a.ply").semantics.space)
     assert "\n" not in str(caught.value)

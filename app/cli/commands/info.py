@@ -71,6 +71,7 @@ def _for_people(document: dict[str, Any]) -> dict[str, Any]:
         "pruning": _pruned(document["pruning"]),
         "antialiased": document["antialiased"] or "",
         "layers": document["layers"] or "",
+        "foreseen": "",  # a warning says what it means
     }
     world = world_from_json(document["world"]) if document["world"] else None
     lines["world"] = world_line(world, document["metric_scale"])
@@ -109,6 +110,8 @@ def _lines(fields: dict[str, Any], indent: str = "") -> list[str]:
         label = f"{indent}{name.replace('_', ' ')}:"
         if isinstance(value, dict):
             lines += [label, *_lines(value, indent + "  ")] if value else []
+        elif name == "warnings" and value:  # sentences, with commas in them
+            lines += [f"{indent}warning: {each}" for each in value]
         else:
             lines.append(f"{label} {_plain(value)}")
     return lines

@@ -46,10 +46,11 @@ def run(args: Namespace, out: TextIO) -> int:
         return INTERRUPTED
     from langflash_core.scene.report import describe, world_line
 
-    say_warnings((*notes, *scene.record.warnings))
+    described = describe(scene)
+    say_warnings((*notes, *described["warnings"]))
     document = {
         "scene": str(args.output),
-        **describe(scene),
+        **described,
         "file_bytes": args.output.stat().st_size,
         "seconds": round(time.perf_counter() - start, 3),
         **({"films": films} if films else {}),

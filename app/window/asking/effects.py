@@ -1,13 +1,16 @@
 """What asking asks of the world: the worker for compiled phrases and scores, the renderer for the picture."""
 
+from dataclasses import replace
+
 from ..commands import Command, Notify
 from ..editing.state import Point
 from ..effects import Effects, Hands
-from ..scene.commands import SceneArrived
+from ..scene.commands import SceneArrived, room_of
 from ..scene.mended import SplitPart
 from ..state import State
 from ..viewport import Viewport
 from .commands import EditPrompt, LoadPrompts, Narrowed, PhrasesCompiled, SavePrompts, SetNegatives
+from .lifting import ForgetPhrases, LiftScene, PhrasesTaught, RememberMute, TeachPhrases, can_learn
 from .parting import TakePartAt, TakePartOut, at_point, divided, own_atom
 from .prompt_sets import PromptSet
 from .work import Answer, DescribeAtoms, Encode, ListParts, ReadPrompts, WeighAtoms, WritePrompts
@@ -75,12 +78,29 @@ class AskingEffects(Effects):
                     submit(SplitPart(info, marks, part.rows, text))
             case TakePartAt(at):
                 self._take_at(at, state)
+            case TeachPhrases() if can_learn(before):
+                info, marks = state.scene.info, state.editing.marks
+                if info is not None and marks is not None:
+                    submit(LiftScene(info, marks))
+            case PhrasesTaught() if command.fits(before):
+                self._take_taught(command, before)
+            case ForgetPhrases() if before.scene.mute is not None:
+                mute = before.scene.mute
+                back = replace(mute.info, history=mute.history)
+                self._hands.perform(SceneArrived(back, room=mute, replaces=True))
             case _:
                 self._weigh(before, state)
         self._list(before, state)
         if _question(before) != _question(state):
             pause = DEBOUNCE_SECONDS if isinstance(command, EditPrompt | SetNegatives) else 0.0
             self._encode_at = self._hands.now() + pause
+
+    def _take_taught(self, command: PhrasesTaught, before: State) -> None:
+        """Show it, and remember what was on show."""
+        assert before.scene.info is not None
+        self._hands.perform(command.arrival(before))
+        self._hands.perform(RememberMute(room_of(before, before.scene.info)))
+        self._hands.perform(Notify("It answers phrases now. Ctrl+Z takes that back.", "info"))
 
     def _take_at(self, at: Point, state: State) -> None:
         """The part that a click means."""

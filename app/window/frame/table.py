@@ -15,6 +15,7 @@ from langflash_core.pictures import KEYED, PICTURES, Picture
 
 from .. import commands as do
 from ..asking import commands as ask
+from ..asking import lifting
 from ..asking.prompt_sets import MOST_PROMPTS
 from ..dialogs import Dialog
 from ..editing import cleaning as clean
@@ -205,6 +206,7 @@ def _asking() -> Iterable[Entry]:
     yield Entry("Save the phrases ...", group, _always(do.ShowDialog(Dialog.SAVE_PROMPTS)))
     yield Entry("Load phrases ...", group, _always(do.ShowDialog(Dialog.LOAD_PROMPTS)))
     yield Entry("Dictionary", group, _dictionary)
+    yield Entry("Teach this file to answer phrases (lift)", group, _teach)
     yield Entry("Keep names for other scenes", group, _taught(teach.KeepWords()))
     yield Entry("Take names from other scenes", group, _taught(teach.TakeWords()))
 
@@ -216,6 +218,10 @@ def _meant(state: State) -> do.Command | None:
 
 def _taught(command: do.Command) -> Callable[[State], do.Command | None]:
     return lambda state: command if state.scene.info is not None and state.scene.info.num_atoms else None
+
+
+def _teach(state: State) -> do.Command | None:
+    return lifting.TeachPhrases() if lifting.can_learn(state) else None
 
 
 def _dictionary(state: State) -> do.Command | None:
@@ -382,6 +388,8 @@ def _undo(state: State) -> do.Command | None:
         return back
     if history and history.done:
         return edit.Undo()
+    if state.scene.mute is not None:
+        return lifting.ForgetPhrases()
     return mending.BringBack() if state.scene.unhidden is not None else back
 
 

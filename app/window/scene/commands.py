@@ -310,6 +310,7 @@ class SceneArrived:
                 view=0 if info.views and start == info.views[0] else None,
                 unhidden=None,
                 shown_by=(),
+                mute=None,
                 job=None,
             ),
             asking=replace(asking, named=made and not asking.asked),

@@ -1,5 +1,6 @@
 """The photos in the tray, the scene made of them, and what of it the picture shows."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -136,7 +137,7 @@ class SceneInfo:
     memory: of what was computed about it last; goes on with the same scene.
     own_views: whether it says which photo made which Gaussian, so that photos can be compared.
     extent: corners (low, high) of the box around nearly all of it, world axes, scene units. above: the map.
-    lenses: those that its photos told.
+    lenses: those that its photos told. doubts: of photos that do not look right what is wrong and what helps.
     """
 
     serial: int
@@ -153,6 +154,7 @@ class SceneInfo:
     extent: tuple[Vector, Vector] | None = None
     above: "Above | None" = field(default=None, compare=False, repr=False)
     lenses: tuple[FoundLens, ...] = ()
+    doubts: Mapping[int, str] = field(default_factory=dict, compare=False)
     memory: SceneMemory = field(default=None, compare=False, repr=False)  # type: ignore[assignment]
 
     def __post_init__(self) -> None:
@@ -215,7 +217,8 @@ class Showing:
     picture; None: not compared.
     unfinished: photos on which work was begun and kept. taken_out: what the tray had before.
     unhidden: the scene on show as it was before something in it was hidden for good, until that is saved;
-    shown_by: files of scenes that show what was hidden in it by then.
+    shown_by: files of scenes that show what was hidden in it by then. mute: the scene on show as it was
+    before it was taught phrases.
     """
 
     photos: tuple[Photo, ...] = ()
@@ -233,6 +236,7 @@ class Showing:
     compare: float | None = None
     unhidden: Room | None = None
     shown_by: tuple[Path, ...] = ()
+    mute: Room | None = None
     job: Job | None = None
     unfinished: tuple[Path, ...] = ()
     taken_out: TakenOut | None = None

@@ -19,6 +19,7 @@ from langflash_core.geometry.reach import median_reach
 from langflash_core.images.still_names import film_of, shown_name
 from langflash_core.picture_files import STORED, opened_picture
 from langflash_core.reconstruction.networks import Networks
+from langflash_core.scene.doubts import doubtful, told_warnings
 from langflash_core.scene.edits import History, Marks
 
 from ..commands import Command, ShowPicture
@@ -155,7 +156,7 @@ def describe_scene(scene: "Scene", serial: int, name: str, path: Path | None = N
     from langflash_core.types import NO_LANGUAGE
 
     mute = scene.semantics.space == NO_LANGUAGE
-    said = ("This splat file holds no language: phrases find nothing in it.",) if mute else ()
+    said = ("This file cannot answer phrases yet; teach it some, beside the phrases.",) if mute else ()
     means = scene.gaussians.means.double().numpy()
     views = []
     for viewmat, K in zip(scene.viewmats.double().numpy(), scene.Ks.double().numpy(), strict=True):
@@ -171,7 +172,8 @@ def describe_scene(scene: "Scene", serial: int, name: str, path: Path | None = N
         num_gaussians=len(scene.gaussians),
         num_atoms=scene.semantics.num_atoms,
         space=scene.semantics.space,
-        warnings=(*said, *scene.record.warnings),
+        warnings=(*said, *told_warnings(scene.record, scene.num_views)),
+        doubts=doubtful(scene.record, scene.num_views),
         path=path,
         history=History(first_marks(scene)),
         own_views=scene.num_views > 1 and scene.view_ids is not None,

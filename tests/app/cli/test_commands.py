@@ -17,7 +17,7 @@ from PIL import Image
 
 import langflash_core
 from langflash_core.pictures import PICTURES
-from langflash_core.scene.file import save
+from langflash_core.scene.file import load, save
 from langflash_core.splat import render
 from langflash_core.types import Camera
 from tests.app.cli.conftest import HEIGHT, WIDTH, WORDS, stripes
@@ -371,6 +371,19 @@ def test_export_picture_and_cut_out(run, scene_file, tmp_path):
     assert outcome.code == 0, outcome.err
     alphas = pixels(tmp_path / "b.png")[..., 3]
     assert alphas[:, : WIDTH // 4].mean() > 200 and alphas[:, WIDTH // 2 :].max() == 0
+
+
+def test_info_says_a_sentence_a_line_which_photos_do_not_look_right(run, scene_file, tmp_path):
+    numbers = {"covered": [1.0, 0.9], "alike": [0.9, 0.2], "nearest": [1, 0]}
+    scene, path = load(scene_file), tmp_path / "torn.langflash"
+    save(scene.with_record(foreseen=numbers, warnings=("one, with a comma",)), path)
+    torn = "photo 2 does not meet the photos beside it; take more photos between 1 and 2, "
+    said = run("info", path).out.splitlines()
+    assert "warning: one, with a comma" in said and not any(line.startswith("foreseen") for line in said)
+    assert sum(line.startswith(f"warning: {torn}") for line in said) == 1
+    document = run("info", path, "--json").json()
+    assert document["foreseen"] == numbers and document["warnings"][1].startswith(torn)
+    assert run("info", scene_file, "--json").json()["foreseen"] is None
 
 
 def test_info(run, scene_file):

@@ -9,6 +9,7 @@ import torch
 from langflash_core.export import export, read
 from langflash_core.export.cameras import read_posed
 from langflash_core.export.language import side_car
+from langflash_core.lift import VIEWS
 from langflash_core.resources import asset_path
 from tests.app.cli.conftest import stripes
 
@@ -83,7 +84,7 @@ def test_a_plain_splat_is_lifted(run, tmp_path):
     outcome = run(*words)
     assert outcome.code == 0, outcome.err
     document = outcome.json()
-    assert document["views"] == 8 and document["atoms"] > 0
+    assert 1 < document["views"] <= VIEWS and document["atoms"] > 0
     lifted = read(tmp_path / "lifted.ply")
     assert lifted.semantics.num_atoms == document["atoms"] and lifted.semantics.space == "minilm"
     assert torch.equal(lifted.gaussians.means, stripes().gaussians.means)

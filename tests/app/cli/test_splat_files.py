@@ -98,7 +98,7 @@ def test_splat_files_have_no_language(refused, ply_file, tmp_path):
         ("export", ply_file, "--prompt", "armchair", "-o", tmp_path / "a.json"),
         ("export", ply_file, "--prompt", "armchair", "-o", tmp_path / "a.html"),
     ):
-        assert "langflash reconstruct" in refused(*words, *TORCH)
+        assert "langflash lift FILE -o SCENE.langflash" in refused(*words, *TORCH)
     assert "no atoms" in refused("render", ply_file, "--what", "atoms", "-o", tmp_path / "a.png", *TORCH)
     assert "no photo 2" in refused("render", ply_file, "--view", "2", "-o", tmp_path / "a.png", *TORCH)
 

@@ -119,7 +119,7 @@ def test_a_splat_file_is_opened_saved_and_said_to_be_mute(
     info = wait_for(worker, show.SceneArrived)[-1].info
     assert (info.num_atoms, len(info.views), info.name) == (0, 1, "room.ply")
     assert info.num_gaussians == len(load(scene_file).gaussians)
-    assert len(info.warnings) == 1 and "no language" in info.warnings[0]
+    assert len(info.warnings) == 1 and "cannot answer phrases yet" in info.warnings[0]
 
 
 def test_failures_are_sentences_and_the_thread_lives_on(

@@ -7,8 +7,10 @@ from ... import commands as do
 from ...editing import commands as edit
 from ...kit import theme, widgets
 from ...kit.look import Look
+from ...scene import commands as show
 from ...state import State
 from .. import commands as ask
+from .. import lifting
 from ..state import Prompt, usable
 from . import entry, known, parts, scores
 
@@ -20,6 +22,7 @@ def draw(state: State, look: Look) -> list[do.Command]:
     """The prompts section."""
     issued: list[do.Command] = []
     widgets.heading("Find")
+    issued += _offer(state, look)
     for prompt in state.asking.prompts:
         imgui.push_id(prompt.key)
         issued += _row(state, prompt, look)
@@ -37,11 +40,31 @@ def draw(state: State, look: Look) -> list[do.Command]:
     return issued
 
 
+def _offer(state: State, look: Look) -> list[do.Command]:
+    """To teach phrases to a scene that knows none; how far that is, and its end."""
+    job = state.scene.job
+    if state.scene.info is None or state.scene.info.num_atoms:
+        return []
+    widgets.muted(lifting.CANNOT)
+    if job is not None and job.title == lifting.TEACHING:
+        pressed = imgui.button(f"{fa.ICON_FA_STOP}  Cancel##teaching")
+        imgui.same_line()
+        imgui.align_text_to_frame_padding()
+        widgets.muted(f"{job.title}: {job.fraction:.0%}")
+        return [show.CancelJob()] if pressed else []
+    imgui.begin_disabled(job is not None)
+    pressed = widgets.primary_button(f"{fa.ICON_FA_GRADUATION_CAP}  Teach it ({lifting.ABOUT})")
+    imgui.end_disabled()
+    widgets.tooltip("Looks at it from where people would stand; Ctrl+Z takes it back")
+    widgets.gap(look.px(2))
+    return [lifting.TeachPhrases()] if pressed else []
+
+
 def _row(state: State, prompt: Prompt, look: Look) -> list[do.Command]:
     corner = imgui.get_cursor_screen_pos()
     issued = _phrase(state, prompt, look)
     issued += _row_buttons(state, prompt, look)
-    if prompt.text.strip() and prompt.visible and state.scene.info is not None:
+    if prompt.text.strip() and prompt.visible and state.scene.info is not None and state.scene.info.num_atoms:
         issued += _verdict(prompt, look)
     shown = state.asking.active_prompt
     if shown is not None and shown.key == prompt.key and len(state.asking.asked) > 1:

@@ -7,6 +7,7 @@ from langflash_core.mending.recipes import MOST_MARGIN
 from langflash_core.scene.edits import Combine
 
 from ... import commands as do
+from ...asking import lifting
 from ...kit import theme, widgets
 from ...kit.look import Look
 from ...state import State
@@ -146,13 +147,16 @@ def _strip(state: State, look: Look, wide: float) -> list[do.Command]:
     history = editing.history
     last = history.done[-1].label if history and history.done else ""
     bring_back = not last and state.scene.unhidden is not None
-    last = "what was hidden" if bring_back else last
+    forget = not last and state.scene.mute is not None
+    last = "what was hidden" if bring_back else "answering phrases" if forget else last
     following = history.undone[-1].label if history and history.undone else ""
     imgui.begin_disabled(not last)
     if _tool_button(
         fa.ICON_FA_ROTATE_LEFT, False, side, f"Undo: {last}  (Ctrl+Z)" if last else "Undo  (Ctrl+Z)"
     ):
-        issued.append(mending.BringBack() if bring_back else edit.Undo())
+        issued.append(
+            mending.BringBack() if bring_back else lifting.ForgetPhrases() if forget else edit.Undo()
+        )
     imgui.end_disabled()
     imgui.begin_disabled(not following)
     tip = f"Redo: {following}  (Ctrl+Shift+Z)" if following else "Redo  (Ctrl+Shift+Z)"

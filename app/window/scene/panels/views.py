@@ -16,6 +16,7 @@ from . import in_space, places
 
 _VIEW = 54.0  # of a photo to jump to
 _SCROLLS = 8  # photos; more may be wider than the window
+_MARK = 7.5  # the radius of what marks a photo
 _BESIDE, _HIGHEST = 154.0, 62.0  # the switches' room at their right, and their height
 
 
@@ -37,8 +38,8 @@ def draw(state: State, look: Look) -> list[do.Command]:
     for view in range(len(state.scene.info.views)):
         if view:
             imgui.same_line()
-        chosen = state.scene.view == view
-        ring = theme.ACCENT if chosen else theme.RAISED
+        doubt = state.scene.info.doubts.get(view, "")
+        ring = theme.ACCENT if state.scene.view == view else theme.RAISED
         picture = look.thumbnails.get(f"view {view}")
         imgui.push_id(view)
         with widgets.colours(button=ring, button_hovered=theme.ACCENT, button_active=theme.ACCENT):
@@ -48,7 +49,10 @@ def draw(state: State, look: Look) -> list[do.Command]:
                 imgui.push_style_var(imgui.StyleVar_.frame_padding, look.vec(3, 3))
                 pressed = imgui.image_button("view", picture[0], ImVec2(round(height * picture[1]), height))
                 imgui.pop_style_var()
-        widgets.tooltip(f"Go to where photo {view + 1} was taken" + ("; scroll for more" if scrolls else ""))
+        if doubt:
+            _mark(look)
+        where = f"Go to where photo {view + 1} was taken" + ("; scroll for more" if scrolls else "")
+        widgets.tooltip(f"{where}\n{doubt}" if doubt else where)
         if pressed:
             issued.append(camera.JumpTo(view))
         imgui.pop_id()
@@ -64,6 +68,16 @@ def draw(state: State, look: Look) -> list[do.Command]:
         imgui.same_line(0, look.px(4))
         issued += places.draw(state, look, look.vec(34, _VIEW + 6))
     return issued
+
+
+def _mark(look: Look) -> None:
+    """In the upper right corner of the photo just drawn: something about it does not look right."""
+    corner, reach = imgui.get_item_rect_max(), look.px(_MARK)
+    middle = ImVec2(corner.x - 1.3 * reach, imgui.get_item_rect_min().y + 1.3 * reach)
+    canvas, size = imgui.get_window_draw_list(), imgui.calc_text_size("!")
+    canvas.add_circle_filled(middle, reach, widgets.u32(theme.BAD))
+    at = ImVec2(middle.x - size.x / 2, middle.y - size.y / 2)
+    canvas.add_text(at, widgets.u32(theme.ON_ACCENT), "!")
 
 
 def _roll() -> None:

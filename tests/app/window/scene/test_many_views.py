@@ -3,9 +3,11 @@
 from dataclasses import replace
 
 import pytest
+from imgui_bundle import ImVec2, imgui
 
 from app.window.frame import layout
-from app.window.kit import theme
+from app.window.kit import theme, widgets
+from app.window.scene.panels import views
 from tests.app.window import headless
 from tests.app.window.scenes import shown_scene
 
@@ -20,3 +22,33 @@ def test_the_switches_beside_the_photos_are_in_sight(count: int) -> None:
         headless.frames(lambda look: layout.draw_all(state, look), headless.look())
         left, top, right, bottom = headless.box("##views")
     assert left >= 0 and right <= 900 and bottom <= 600 and bottom - top <= 90
+
+
+def test_a_photo_that_does_not_look_right_is_marked_and_says_why(monkeypatch) -> None:
+    state, marks, tips = shown_scene(), [], []
+    assert state.scene.info is not None
+    doubtful = replace(state.scene.info, doubts={1: "It stands alone; take more photos."})
+    monkeypatch.setattr(views, "_mark", marks.append)
+    monkeypatch.setattr(widgets, "tooltip", tips.append)
+    with headless.context((900, 600)):
+        theme.set_up(1.0)
+        look = headless.look()
+        headless.frames(lambda look: layout.draw_all(state.with_scene(info=doubtful), look), look, 1)
+        assert marks == [look] and "Stand where photo 2 was taken\nIt stands alone; take more photos." in tips
+        headless.frames(lambda look: layout.draw_all(state, look), look, 1)
+        assert marks == [look]
+
+
+def test_the_mark_is_in_the_corner_of_the_photo() -> None:
+    with headless.context((900, 600)):
+        theme.set_up(1.0)
+        drawn = []
+
+        def draw(look) -> None:
+            imgui.button("photo", ImVec2(80, 54))
+            before = imgui.get_window_draw_list().vtx_buffer.size()
+            views._mark(look)
+            drawn.append(imgui.get_window_draw_list().vtx_buffer.size() - before)
+
+        headless.frames(draw, headless.look(), 1)
+        assert drawn[0] > 8  # a disc and a letter

@@ -1,0 +1,106 @@
+"""A splat file of another program answers no phrases until it is taught some: what can happen then, and the
+worker's side of it.
+
+Teaching makes another scene, with its own history; the one before is remembered (`Showing.mute`), and Undo
+goes back to it. Heavy imports wait until they are needed.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field, replace
+
+from langflash_core.scene.edits import Marks
+
+from ..commands import Notify
+from ..requests import Asked
+from ..requests import Job as Request
+from ..scene.commands import SceneArrived, room_of
+from ..scene.state import Job, Room, SceneInfo
+from ..scene.work import describe_scene
+from ..state import State
+
+TEACHING = "Teaching it to answer phrases"
+"""Title of the job."""
+CANNOT = "This file cannot answer phrases yet."
+ABOUT = "about 30 s"
+"""Without a graphics card: 345,000 Gaussians take 25 s of one core, and the network is read before."""
+
+
+def can_learn(state: State) -> bool:
+    """Whether the scene on show has no language, and nothing else is being made."""
+    return state.scene.info is not None and not state.scene.info.num_atoms and state.scene.job is None
+
+
+@dataclass(frozen=True)
+class TeachPhrases:
+    """Have the network look at the scene from all over it."""
+
+    def apply(self, state: State) -> State:
+        if not can_learn(state):
+            return state
+        return state.with_scene(job=Job(TEACHING, "drawing", started=state.now))
+
+
+@dataclass(frozen=True)
+class PhrasesTaught:
+    """The scene with number `serial`, as its marks had edited it, with language."""
+
+    serial: int
+    marks: Marks
+    info: SceneInfo
+
+    def fits(self, state: State) -> bool:
+        """Whether nothing has been edited meanwhile."""
+        info = state.scene.info
+        return info is not None and info.serial == self.serial and state.editing.marks == self.marks
+
+    def apply(self, state: State) -> State:
+        if self.fits(state):
+            return state
+        text = "It was not taught, since the scene was edited meanwhile; teach it again."
+        return Notify(text).apply(state.with_scene(job=None))
+
+    def arrival(self, state: State) -> SceneArrived:
+        """What brings it into a state that it fits: the view stays."""
+        return SceneArrived(
+            self.info, room=replace(room_of(state, self.info), history=None, saved=None), replaces=True
+        )
+
+
+@dataclass(frozen=True)
+class RememberMute:
+    """The scene as it was before it was taught."""
+
+    room: Room
+
+    def apply(self, state: State) -> State:
+        return state.with_scene(mute=self.room)
+
+
+@dataclass(frozen=True)
+class ForgetPhrases:
+    """Go back to the scene as it was before it was taught."""
+
+    def apply(self, state: State) -> State:
+        return state
+
+
+@dataclass(frozen=True)
+class LiftScene(Request):
+    """The scene as edited, with what the network sees in it."""
+
+    info: SceneInfo
+    marks: Marks = field(repr=False)
+
+    def run(self, serial: int, progress: Callable[[str, float], None], cancelled: Asked) -> PhrasesTaught:
+        from langflash_core.lift import lift
+        from langflash_core.mending.looks import drawn
+        from langflash_core.scene.edited import edited_scene
+
+        own = self.info
+        scene = lift(
+            edited_scene(own.scene, self.marks),
+            render=lambda scene, camera: drawn(scene, camera, weight_maps=False),
+            progress=progress,
+            cancelled=cancelled,
+        )
+        return PhrasesTaught(own.serial, self.marks, describe_scene(scene, serial, own.name))
