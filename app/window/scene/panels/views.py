@@ -44,7 +44,7 @@ def draw(state: State, look: Look) -> list[do.Command]:
         imgui.push_id(view)
         with widgets.colours(button=ring, button_hovered=theme.ACCENT, button_active=theme.ACCENT):
             if picture is None:
-                pressed = imgui.button(str(view), ImVec2(height, height))
+                pressed = imgui.button(str(view + 1), ImVec2(height, height))
             else:
                 imgui.push_style_var(imgui.StyleVar_.frame_padding, look.vec(3, 3))
                 pressed = imgui.image_button("view", picture[0], ImVec2(round(height * picture[1]), height))
