@@ -25,32 +25,57 @@ A_PHOTO = 32 * 24  # cells of a photo's grid, at the most
 QUANTILES = (0.1, 0.5, 0.9)
 """Of the depths in a cell, each a sample: a table seen aslant has no hole, and an edge both its sides."""
 SOLID = 0.1  # opacity from which a Gaussian is a surface
-CLEAR = 0.12
+CLEAR = 0.18
 """Of the scene's depth, that a camera keeps from surfaces: what is nearer than a tenth fills the picture with
-a few Gaussians, and of a few photos samples lie up to a tenth apart."""
+a few Gaussians, and samples lie up to a tenth apart."""
 ASIDE = math.cos(math.radians(60.0))
 """Degrees between camera and photo, at a surface, up to which it counts as seen: there a picture has faded to
 the half (langflash_core/scene/trust.py)."""
 CELLS = (16, 12)  # of a picture, of which it is asked whether they show something
+SHOWN = 4  # layers of a picture: `NEAREST` of langflash_core/splat/compose.py
 _LEVELS = 5  # of cells, each twice as large: the largest is the picture
+
+
+@dataclass(frozen=True)
+class Layers:
+    """Where the photos of a scene of layers stand: views (V,), centres and axes (V, 3), world; distance: that
+    counts as much as a radian, scene units."""
+
+    views: Integer[np.ndarray, " V"]
+    centres: Float[np.ndarray, "V 3"]
+    axes: Float[np.ndarray, "V 3"]
+    distance: float
+
+    def nearest(self, pose: Pose) -> Integer[np.ndarray, " L"]:
+        """Photos whose layers a picture shows, as langflash_core/splat/compose.py chooses them."""
+        ways = np.linalg.norm(self.centres - pose.centre, axis=1) / self.distance
+        chords = np.linalg.norm(self.axes - pose.axes[:, 2], axis=1)
+        far = ways + 2 * np.arcsin(np.minimum(chords / 2, 1))
+        return self.views[np.argsort(far, kind="stable")[:SHOWN]]
 
 
 @dataclass(frozen=True)
 class Surroundings:
     """places (n, 3), eyes (n, 3): of samples and of the photos that saw them, world. sizes (n,): across,
-    scene units. rows (n,): their Gaussians. depth: median from photo to sample, scene units."""
+    scene units. rows (n,): their Gaussians; views (n,): their photos, of which `layers` says where they
+    stand. depth: median from photo to sample, scene units."""
 
     places: Float[np.ndarray, "n 3"]
     eyes: Float[np.ndarray, "n 3"]
     sizes: Float[np.ndarray, " n"]
     rows: Integer[np.ndarray, " n"]
+    views: Integer[np.ndarray, " n"]
     depth: float
+    layers: Layers | None = None
 
     def of(self, there: Bool[np.ndarray, " N"]) -> "Surroundings":
         """Those whose Gaussians are there; the depth stays."""
         kept = there[self.rows]
-        places, eyes, sizes, rows = (each[kept] for each in (self.places, self.eyes, self.sizes, self.rows))
-        return replace(self, places=places, eyes=eyes, sizes=sizes, rows=rows)
+        return self._only(kept)
+
+    def _only(self, kept: Bool[np.ndarray, " n"]) -> "Surroundings":
+        names = ("places", "eyes", "sizes", "rows", "views")
+        return replace(self, **{name: getattr(self, name)[kept] for name in names})
 
     @property
     def clear(self) -> float:
@@ -70,7 +95,11 @@ class Surroundings:
         return math.sqrt(far[first]), ways[first]
 
     def known(self, pose: Pose) -> float:
-        """Share of the pose's picture, its box, that photos saw from about there, in [0, 1]."""
+        """Share of the pose's picture, its box, that photos saw from about there, in [0, 1]; of a scene of
+        layers those photos alone whose layers it shows."""
+        if self.layers is not None:
+            drawn = np.isin(self.views, self.layers.nearest(pose))
+            return replace(self._only(drawn), layers=None).known(pose)
         depths, pixels, focal, inside = self._seen(pose)
         places, own = self.places[inside], self.eyes[inside] - self.places[inside]
         ways = np.array(pose.centre) - places
@@ -127,8 +156,18 @@ def surroundings_of(scene: "Scene") -> Surroundings | None:
     if not any(len(rows) for rows, _, _ in found):
         return None
     rows, sizes, eyes = (np.concatenate(part) for part in zip(*found, strict=True))
+    layers = _layers(scene, views) if scene.layered else None
     depth = float(np.median(np.linalg.norm(means[rows] - eyes, axis=1)))
-    return Surroundings(means[rows], eyes, sizes, rows, depth)
+    return Surroundings(means[rows], eyes, sizes, rows, ids[rows], depth, layers)
+
+
+def _layers(scene: "Scene", views: list[int]) -> Layers:
+    from langflash_core.geometry.cameras import invert_rigid, median_distance  # loads torch
+
+    viewmats = scene.viewmats.detach().cpu().double()
+    centres = invert_rigid(viewmats)[:, :3, 3].numpy()
+    distance = median_distance(scene.gaussians.means, scene.viewmats[0])
+    return Layers(np.array(views), centres[views], viewmats[views, 2, :3].numpy(), distance)
 
 
 def _sampled(

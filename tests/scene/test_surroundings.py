@@ -9,7 +9,16 @@ import torch
 
 from langflash_core.geometry import poses
 from langflash_core.geometry.poses import Pose, Vector, from_view
-from langflash_core.scene.surroundings import A_PHOTO, MOST, QUANTILES, Surroundings, surroundings_of
+from langflash_core.scene.surroundings import (
+    A_PHOTO,
+    MOST,
+    QUANTILES,
+    SHOWN,
+    Layers,
+    Surroundings,
+    surroundings_of,
+)
+from langflash_core.splat.compose import NEAREST, Nearness
 from langflash_core.types import Scene
 from tests.app.window.scenes import room
 
@@ -22,7 +31,8 @@ def wall() -> Surroundings:
     steps = np.arange(-4, 4, SPACING) + SPACING / 2
     x, y = (grid.ravel() for grid in np.meshgrid(steps, steps))
     places = np.stack((x, y, np.full(len(x), FAR)), 1)
-    return Surroundings(places, np.zeros_like(places), np.full(len(x), SPACING), np.arange(len(x)), depth=FAR)
+    rows = np.arange(len(x))
+    return Surroundings(places, np.zeros_like(places), np.full(len(x), SPACING), rows, rows % 2, FAR)
 
 
 @pytest.fixture(scope="module")
@@ -73,6 +83,19 @@ def test_a_photos_own_picture_is_known_and_what_is_behind_it_is_not(scene: Scene
         assert around.known(home) > 0.95 and around.known(poses.look(home, math.pi, 0.0)) == 0
         # Half of it is out of sight; from beside, the other photo shows a part of that.
         assert 0.4 < around.known(half) < 0.75
+
+
+def test_of_layers_those_that_a_picture_shows_are_known(wall: Surroundings) -> None:
+    """As the renderer chooses them: six photos in a row, of which the left half saw the wall."""
+    at = np.stack((np.arange(6.0), np.zeros(6), np.zeros(6)), 1)
+    layers = Layers(np.arange(6), at, np.tile([0.0, 0.0, 1.0], (6, 1)), FAR)
+    nearness = Nearness(at, layers.axes, FAR, tuple(range(6)))
+    left = replace(wall, views=wall.rows % 3, layers=layers)
+    for place, known in ((0.0, True), (2.0, True), (5.0, False)):
+        pose = Pose(Vector(place, 0.0, 0.0))
+        chosen = nearness.chosen(poses.to_camera(pose, 64, 48), SHOWN).views
+        assert SHOWN == NEAREST and set(layers.nearest(pose).tolist()) >= set(chosen)
+        assert (left.known(pose) > replace(left, layers=None).known(pose) / 2) == known
 
 
 def test_samples_are_as_wide_as_their_cells_however_near_one_comes(wall: Surroundings) -> None:

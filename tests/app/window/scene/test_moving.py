@@ -66,7 +66,8 @@ def wall(monkeypatch: pytest.MonkeyPatch) -> Surroundings:
     x, y = (grid.ravel() for grid in np.meshgrid(steps, steps))
     places = np.stack((x, y, np.full(len(x), WALL)), 1)
     eyes = places - (0.0, 0.0, 1.0)
-    made = Surroundings(places, eyes, np.full(len(x), 2 * SPACING), np.arange(len(x)), depth=WALL)
+    rows = np.arange(len(x))
+    made = Surroundings(places, eyes, np.full(len(x), 2 * SPACING), rows, 0 * rows, WALL)
     monkeypatch.setattr(near, "surroundings", lambda state: made)
     return made
 
@@ -203,7 +204,7 @@ def test_nothing_holds_who_does_not_want_it_and_no_wall_that_is_deleted(state: S
 
 def test_a_walk_is_slower_where_something_is_near(state: State, wall: Surroundings) -> None:
     far = Pose(Vector(0.0, 0.0, 0.0), reach=WALL)
-    close = replace(far, centre=Vector(0.0, 0.0, WALL - 2 * wall.clear))
+    close = replace(far, centre=Vector(0.0, 0.0, WALL - 1.1 * wall.clear))
     assert moving.speed(state, far) == pytest.approx(moving.SPEED * WALL)
     assert 0 < moving.speed(state, close) < 0.6 * moving.speed(state, far)
 
