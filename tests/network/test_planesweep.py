@@ -45,8 +45,9 @@ def taken(place: tuple[float, float, float], thing: bool = True) -> tuple[np.nda
     def seen(depth: float, pattern: np.ndarray, scale: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         z = depth - place[2]
         at = place[0] + x * z, place[1] + y * z
-        maps = [(128 + along * scale).astype(np.float32) for along in at]
-        return cv2.remap(pattern, *maps, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REFLECT), at[0], at[1]
+        across, down = ((128 + along * scale).astype(np.float32) for along in at)
+        shown = cv2.remap(pattern, across, down, cv2.INTER_LINEAR, borderMode=cv2.BORDER_REFLECT)
+        return shown, at[0], at[1]
 
     picture, _, _ = seen(WALL, surface(0), 80 / WALL * 2)
     depth = np.full(picture.shape, WALL - place[2])

@@ -112,9 +112,8 @@ class _Scene:
             for along in pictured(self.pose(view, other), self.Ks[other], points)
         )
         inside = (z > 0) & (x > 0) & (y > 0) & (x < width) & (y < height)
-        return *(np.where(inside, along, -1e4).astype(np.float32) for along in (x, y)), np.log(
-            np.maximum(z, 1e-6)
-        )
+        x, y = (np.where(inside, along, -1e4).astype(np.float32) for along in (x, y))
+        return x, y, np.log(np.maximum(z, 1e-6))
 
 
 class _Windows:
