@@ -28,7 +28,7 @@ def drag(program: Program, right: int) -> dict:
 
 def keep_or_not(program: Program) -> None:
     """Switch over whether it keeps to what the photos saw."""
-    program.xdotool("key", "ctrl+p", "sleep", "0.5", "type", "--delay", "5", "keep to what")
+    program.xdotool("key", "ctrl+p", "sleep", "0.5", "type", "--delay", "5", "stay near the")
     program.until(lambda s: s["dialog"] == "palette", "the palette")
     program.xdotool("sleep", "0.5", "key", "Return")
     program.until(lambda s: s["dialog"] is None, "the command")
