@@ -51,7 +51,7 @@ def draw_settings(state: State, look: Look) -> list[do.Command]:
     for text, name in (
         ("Touchpad: two fingers orbit; with Ctrl they zoom, with Shift they pan", "touch_pad"),
         ("Show the photos' cameras in the scene", "photos_in_space"),
-        ("Stay near the photos: orbits slow down, and the rest fades", "near_photos"),
+        ("Stay near the photos: moves slow down, and the rest fades", "near_photos"),
         ("Show a grid on the floor, once the scene is level", "floor_grid"),
         ("Fill gaps from what is around them", "fill_gaps"),
         ("Reconstruct as soon as photos are dropped", "start_at_once"),

@@ -31,7 +31,7 @@ _PLACES = 20_000  # pixels; beyond this a window position is no position
 class Preferences:
     """theme: of THEMES. colormap: of heat-maps. scale: of the interface, on top of the monitor's. speed: of
     flying, a factor. touch_pad: two fingers turn, with Ctrl they zoom. photos_in_space: the cameras' frusta
-    are drawn. near_photos: the picture fades, and orbits slow down, where no photo looked from about
+    are drawn. near_photos: the picture fades, and moves slow down, where no photo looked from about
     there. fill_gaps: it shows what is around its gaps. floor_grid: squares of a metre on the floor.
     start_at_once: dropped photos are reconstructed without asking. detail: of DETAILS, how fine scenes of
     photos are. panel_width: design pixels. window: x, y, width, height in screen pixels, or none.
