@@ -34,7 +34,7 @@ def test_a_photo_that_does_not_look_right_is_marked_and_says_why(monkeypatch) ->
         theme.set_up(1.0)
         look = headless.look()
         headless.frames(lambda look: layout.draw_all(state.with_scene(info=doubtful), look), look, 1)
-        assert marks == [look] and "Stand where photo 2 was taken\nIt stands alone; take more photos." in tips
+        assert marks == [look] and "Go to where photo 2 was taken\nIt stands alone; take more photos." in tips
         headless.frames(lambda look: layout.draw_all(state, look), look, 1)
         assert marks == [look]
 
