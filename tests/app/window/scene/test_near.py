@@ -34,9 +34,9 @@ def test_how_far_the_photos_are_is_told_where_the_picture_fades(state: State) ->
     assert FADING == FULL  # said twice, because the window starts before torch is there
     assert places_to_keep_to(state) == tuple(view.centre for view in VIEWS)
     assert degrees_from_photos(state) == pytest.approx(40)
-    assert any("40 degrees aside" in text for text in figures(state))
+    assert any("40° away" in text for text in figures(state))
     home = state.with_scene(pose=VIEWS[1])
-    assert degrees_from_photos(home) < 1e-5 and not any("aside" in text for text in figures(home))
+    assert degrees_from_photos(home) < 1e-5 and not any("away from" in text for text in figures(home))
 
 
 def test_nothing_is_kept_to_where_nobody_knows_the_photos_or_wants_to(state: State) -> None:
