@@ -248,9 +248,10 @@ def test_a_typed_phrase_lights_up_where_it_is(program: Program) -> None:
     difference = abs(heat - plain).mean(-1)
     height, width = difference.shape
     spot = heat[height * 6 // 10 - 20 : height * 6 // 10 + 20, width * 3 // 10 - 20 : width * 3 // 10 + 20]
-    # The scale ends in pale yellow; over the block's own red at 0.7 opacity red and green are strong.
+    # The scale ends in pale yellow (252, 255, 164); over the block's own red its blue may grow, never to its red.
     assert difference[height * 6 // 10, width * 3 // 10] > 10
-    assert spot[..., 0].mean() > 200 and spot[..., 1].mean() > 150 > spot[..., 2].mean()
+    red, green, blue = spot.reshape(-1, 3).mean(0)
+    assert red > 200 and green > 150 and blue < red - 40
     # The wall is dimmed, and stays grey.
     wall, before = heat[height // 10, width * 8 // 10], plain[height // 10, width * 8 // 10]
     assert wall.sum() < 0.95 * before.sum() and np.ptp(wall) < 25
