@@ -133,11 +133,14 @@ def test_what_check_raises_ends_the_work():
         searched(wall, photos, viewmats(), KS, ALL, check)
 
 
-def test_depths_that_are_no_numbers_stay_where_they_are():
+@pytest.mark.parametrize("depth", [12.0, math.nan, math.inf])  # log depths; the first is as far as maps go
+def test_depths_that_are_none_touch_no_other(depth):
     photos, _, wall = room()
     wild = wall.clone()
-    wild[:, 40:44, 50:60] = 12.0  # as far as a map goes
-    assert searched(wild, photos, viewmats(), KS, ALL).isfinite().all()
+    wild[:, 40:44, 50:60] = depth
+    others = wild.isfinite() & (wild < 12)
+    found = searched(wild, photos, viewmats(), KS, ALL)
+    assert found[others].isfinite().all()
 
 
 def test_a_plane_is_what_its_depth_everywhere_is():

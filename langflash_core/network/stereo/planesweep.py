@@ -148,7 +148,7 @@ def _swept(scene: _Scene, view: int, others: Sequence[int]) -> _Found:
     volume = [_best([windows.alike(p) for p in _on_plane(scene, view, others, r)]) for r in inverse.tolist()]
     best, most = _largest(volume)
     found = -np.log(_peaks(volume, best, inverse)).astype(np.float32)
-    other = (most > _ALIKE) & (most - now > _BETTER) & (np.abs(found - own) > _OTHER)
+    other = (most > _ALIKE) & (most - now > _BETTER) & (np.abs(found - own) > _OTHER) & np.isfinite(own)
     return _Found(found, other, now > _ALIKE)
 
 
