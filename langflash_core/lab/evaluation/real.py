@@ -86,18 +86,19 @@ class _Walk:
 def chosen_frames(frames: Sequence[Path], photos: int) -> tuple[list[Path], list[Path]]:
     """Photos, evenly from the first frame to the last, and those held back between.
 
+    One frame is held back between each two photos; where frames are too few for that, all the others.
+
     Raises:
-        InputError: there are too few.
+        InputError: there are fewer frames than photos.
     """
-    count = 2 * photos - 1
-    if photos < 2 or len(frames) < count:
+    if photos < 2 or len(frames) < photos:
         raise InputError(
-            f"{photos} photos and a frame between each two need {count} frames, but there are {len(frames)}; "
-            "choose fewer with --photos"
+            f"{photos} photos cannot be chosen from {len(frames)} frames; "
+            f"choose 2 to {len(frames)} with --photos"
         )
-    places = np.linspace(0, len(frames) - 1, count).round().astype(int)
-    chosen = [frames[place] for place in places]
-    return chosen[::2], chosen[1::2]
+    places = np.linspace(0, len(frames) - 1, min(len(frames), 2 * photos - 1)).round().astype(int)
+    kept = places[np.linspace(0, len(places) - 1, photos).round().astype(int)]
+    return [frames[place] for place in kept], [frames[place] for place in np.setdiff1d(places, kept)]
 
 
 def judge(
@@ -119,9 +120,10 @@ def judge(
     kept, held = chosen_frames(frames, photos)
     progress("places of all frames", 0.0)
     walk = _walked(sorted({*kept, *held}), bench)
+    share = len(walk.frames) / (len(kept) + len(held))
     kept, held = ([frame for frame in some if frame in walk.frames] for some in (kept, held))
-    if len(kept) < 2 or not held:
-        raise InputError("fewer than three frames find a place beside each other; film more slowly")
+    if len(kept) < 2:
+        raise InputError("fewer than two photos find a place beside each other; film more slowly")
     progress("the scene", 0.3)
     start, cpu = time.perf_counter(), time.process_time()
     scene = _made(kept, walk, bench)
@@ -132,7 +134,7 @@ def judge(
         kind = OWN if number < len(kept) else BETWEEN
         fewer = _fewer(frame, kept, walk, bench) if bench.alone else None
         rows[kind][frame.name] = rounded(_row(kind, frame, scene, fewer, walk, bench, shown))
-    once = {"photos": len(kept), "placed": len(walk.frames) / (2 * photos - 1)}
+    once = {"photos": len(kept), "placed": share}
     return {**rounded({**once, "gaussians": float(len(scene.gaussians)), **took}), **rows}
 
 
@@ -231,4 +233,4 @@ def _worst(case: dict) -> dict:
 
 
 def _rows(case: dict) -> list[tuple[str, list[dict]]]:
-    return [(kind, list(case[kind].values())) for kind in (OWN, BETWEEN)]
+    return [(kind, list(case[kind].values())) for kind in (OWN, BETWEEN) if case[kind]]

@@ -31,6 +31,8 @@ def real_markdown(result: Mapping) -> str:
             "",
         ]
         for kind, (title, alone) in _KINDS.items():
+            if not case[kind]:
+                continue
             lines += [f"| {title}, {len(case[kind])} | scene | {alone} |", "|---|---|---|"]
             lines += [line for row in ROWS if (line := _line(case, kind, *row))]
             lines.append("")
