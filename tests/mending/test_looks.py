@@ -50,4 +50,5 @@ def test_layers_are_blended_by_whoever_draws():
         assert torch.allclose(ours.depths, theirs.depths, atol=3e-3)
         ((matte, depths),) = mattes(scene, part, [scene.camera(view)], drawn)
         assert torch.allclose(matte, theirs.weight_maps[..., 1], atol=3e-4)
-        assert torch.equal(depths, ours.depths)
+        # drawn with other weight maps: sums of as many terms, each product rounded for its own shape
+        assert torch.allclose(depths, ours.depths, rtol=1e-5, atol=0)
