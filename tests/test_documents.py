@@ -16,7 +16,7 @@ ROOT = Path(__file__).resolve().parent.parent
 CARD, HISTORY = "assets/weights/mini_card.md", "assets/weights/mini_history.md"
 WORDS = {
     "README.md": 2_400,
-    "GUIDE.md": 7_000,
+    "GUIDE.md": 6_500,
     "LAB.md": 4_300,
     "ARCHITECTURE.md": 4_300,
     "CONTRIBUTING.md": 3_300,
