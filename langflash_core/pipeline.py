@@ -63,7 +63,7 @@ def reconstruct(
     ahead: Ahead | None = None,
     networks: "Networks | None" = None,
 ) -> Scene:
-    """Photos of one room to a 3D scene that can be queried, in one forward pass.
+    """Photos of one room to a 3D scene that can be queried, by a small network and exact geometry.
 
     Args:
         photos: one or more files; the first one's camera becomes the world.

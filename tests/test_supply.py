@@ -91,8 +91,6 @@ def test_notice_names_all_that_is_shipped_of_others():
         "mini_history.md",
         "mini_orbit.jpg",
         "mini_sheet.jpg",
-        "mini_sides.jpg",
-        "mini_walk.jpg",
     }
     for folder in ("weights", "photos"):
         for path in (ROOT / "assets" / folder).iterdir():

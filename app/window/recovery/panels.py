@@ -22,8 +22,8 @@ _EDITS_OFFER, _ANSWER, _NAME = 470.0, 108.0, 180.0  # design pixels wide; its bu
 _OFFER = 480.0  # design pixels
 _OF_TOOLS = ("##card", "##ruler", "##keys", "Rules")  # windows, beside their bars
 _DETAIL_TIP = (
-    "How fine the next scene will be\nnormal: about 140,000 Gaussians from two photos\n"
-    "high: 1.4 times as many, slower to draw\nlow: a third, quicker to draw"
+    "How fine the next scene will be\nnormal: about 240,000 Gaussians from two photos\n"
+    "high: 1.6 times as many, slower to draw\nlow: a third, quicker to draw"
 )
 
 

@@ -32,7 +32,7 @@ MEASURES = (
 METHOD_TITLES = {"atoms": "the program: atoms drawn", "features": "2D features of each view, no scene"}
 PUBLISHED: dict[str, Sequence[tuple[str, float, float]]] = {
     "scannet": (
-        ("LangFlash as published (Li et al. 2026), main table", 0.7416, 0.8718),
+        ("LangFlash as published (Liu et al. 2026), main table", 0.7416, 0.8718),
         ("LangFlash as published, table of K, K = 128", 0.7144, 0.8547),
     ),
 }

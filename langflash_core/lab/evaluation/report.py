@@ -57,7 +57,7 @@ PUBLISHED = Table(
     "",
     ("system", "data", "measure", "value"),
     (
-        ("LangFlash (Li et al. 2026), main table", "ScanNet, 40 scenes", "mIoU, accuracy", "0.7416, 0.8718"),
+        ("LangFlash (Liu et al. 2026), main table", "ScanNet, 40 scenes", "mIoU, accuracy", "0.7416, 0.8718"),
         ("LangFlash, table of K, K = 128", "ScanNet, 40 scenes", "mIoU, accuracy", "0.7144, 0.8547"),
         ("EPS3D (arXiv 2606.08980)", "as published", "panoptic quality, instance mIoU", "0.530, 0.42"),
         ("Instok3D (arXiv 2606.29513), one vector a group", "ScanNet", "mIoU", "0.635"),

@@ -26,7 +26,7 @@ PAPER_MS = {
     "language features": 6.0, "shared encoder": 32.0, "grouping": 38.0, "aggregation": 72.0,
     "Gaussian decoder": 32.0, "all": 180.0,
 }  # fmt: skip
-"""Li et al. 2026, supplement: 2 photos of 256 x 256, K = 128; the GPU is not named."""
+"""Liu et al. 2026, supplement: 2 photos of 256 x 256, K = 128; the GPU is not named."""
 
 
 @dataclass(frozen=True)
