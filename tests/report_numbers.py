@@ -1,7 +1,7 @@
 """Write the report's tables into the documents that show them: `python -m tests.report_numbers`.
 
 Afterwards every number between `<!-- report ... -->` and `<!-- end -->` is that of
-`assets/report/report.json`, which `langflash eval report ... --small assets/report` makes.
+`assets/report/report.json`, which `langflash lab eval report ... --small assets/report` makes.
 """
 
 import json

@@ -175,10 +175,11 @@ def imported_names() -> set[str]:
 def test_holds_every_shader_and_asset(wheel):
     with zipfile.ZipFile(wheel) as archive:
         sizes = {entry.filename: entry.file_size for entry in archive.infolist()}
+    # what people read in the repository, and what only the lab draws
+    left = [ROOT / name for name in ("assets/readme", "assets/report", "shaders/rooms")]
     for kind in ("shaders", "assets"):
         files = [path for path in (ROOT / kind).rglob("*") if path.is_file()]
-        for left in ("readme", "report"):  # what people read in the repository
-            files = [path for path in files if not path.is_relative_to(ROOT / "assets" / left)]
+        files = [path for path in files if not any(path.is_relative_to(folder) for folder in left)]
         assert files
         for path in files:
             name = f"langflash_core/_bundled/{path.relative_to(ROOT).as_posix()}"
@@ -198,6 +199,7 @@ def test_holds_no_tests_and_no_rubbish(wheel):
     tops = {name.split("/")[0] for name in names}
     assert tops == {"langflash_app", "langflash_core", f"langflash-{langflash_core.__version__}.dist-info"}
     assert not [name for name in names if name.endswith((".pyc", ".part", ".log"))]
+    assert not [name for name in names if "/lab/" in name or "/shaders/rooms/" in name]
     assert "langflash_core/py.typed" in names
 
 
@@ -329,6 +331,16 @@ def test_the_core_alone_does_the_work(bare, tmp_path):
     assert [answer["prompt"] for answer in said["prompts"]] == ["book"]
     bare.langflash("export", "s.langflash", "-o", "s.ply", cwd=tmp_path)
     assert (tmp_path / "q").is_dir() and (tmp_path / "s.ply").stat().st_size > 10_000
+
+
+@pytest.mark.parametrize("words", [["lab"], ["lab", "eval", "rooms"], ["eval", "rooms"]])
+def test_the_lab_is_named_by_where_it_runs(bare, tmp_path, words):
+    done = subprocess.run(
+        [bare.scripts / "langflash", *words], cwd=tmp_path, capture_output=True, text=True, timeout=60
+    )
+    assert done.returncode == 2 and done.stderr.count("\n") == 1
+    assert "runs in a checkout of the repository" in done.stderr
+    assert "lab" not in bare.langflash("--help", cwd=tmp_path).split()
 
 
 def test_the_core_alone_says_what_is_missing(bare, tmp_path):

@@ -40,6 +40,6 @@ def test_a_marked_table_is_replaced_and_nothing_else():
 
 def test_the_report_names_machine_weights_and_command():
     document = json.loads(SMALL.read_bytes())
-    assert document["command"].startswith("langflash eval report")
+    assert document["command"].startswith("langflash lab eval report")
     assert document["weights"] and document["machine"]["versions"] and document["made"]
     assert "/tmp" not in json.dumps(document) and "/work" not in json.dumps(document)

@@ -6,7 +6,7 @@ from collections.abc import Mapping
 from textwrap import fill
 
 LAB = ("rooms", "labels", "train", "eval", "bench-network")
-"""Commands that make and judge the weights."""
+"""Commands of `langflash lab`, which make and judge the weights."""
 
 GROUPS = {
     "make scenes": ("reconstruct", "frames", "batch", "lift"),
@@ -15,7 +15,7 @@ GROUPS = {
     "edit them": ("clean", "hide", "level"),
     "share them": ("export",),
     "this program": ("weights", "bench", "completion", "desktop"),
-    "the lab, where weights are made and judged": LAB,
+    "the lab": ("lab",),
 }
 """Every command, under the heading that `--help` gives it."""
 

@@ -1,16 +1,17 @@
 """The words of the command line. Only the standard library is imported here."""
 
 import argparse
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable
 from importlib import import_module
+from importlib.util import find_spec
 from typing import Any, NoReturn
 
 import langflash_core
 from langflash_core.errors import InputError
 
-from .overview import in_groups
+from .overview import LAB, in_groups
 
-_JUDGING, _SCENES, _SHOWING, _TRAINING = "judging", "scenes", "showing", "training"
+_JUDGING, _SCENES, _SHOWING = "words.judging", "words.scenes", "words.showing"
 COMMANDS = {
     "view": _SCENES,
     "reconstruct": _SCENES,
@@ -27,17 +28,13 @@ COMMANDS = {
     "inventory": _SCENES,
     "info": _SCENES,
     "bench": _JUDGING,
-    "bench-network": _JUDGING,
-    "rooms": _TRAINING,
-    "labels": _TRAINING,
-    "train": _TRAINING,
-    "eval": _JUDGING,
     "weights": _SCENES,
     "words": _SCENES,
     "desktop": _SHOWING,
     "completion": _SHOWING,
+    "lab": "lab.words",
 }
-"""Every command, and the module of `words` whose `add_COMMAND` has its words."""
+"""Every command, and the module whose `add_COMMAND` has its words."""
 
 
 class UsageError(InputError):
@@ -63,6 +60,10 @@ class Parser(argparse.ArgumentParser):
         """
         if not isinstance(action, argparse._SubParsersAction) or value in action.choices:
             return super()._check_value(action, value)
+        if value in LAB and self.prog == "langflash":
+            raise UsageError(f'"{value}" is a command of the lab; {lab_remedy(value)}')
+        if value == "lab":  # of a wheel, which leaves it out
+            raise UsageError(f"the lab is not installed; {lab_remedy()}")
         near = nearest(value, action.choices)
         offered = f'did you mean "{self.prog} {near}"?' if near else f"{self.prog} --help lists them"
         raise UsageError(f'"{self.prog} {value}" is not a command; {offered}')
@@ -81,13 +82,27 @@ def build_parser(command: str | None = None) -> Parser:
     commands = parser.add_subparsers(
         dest="command", metavar="COMMAND", required=True, prog="langflash", help=argparse.SUPPRESS
     )
-    for name in [command] if command in COMMANDS else COMMANDS:
-        words = import_module(f".words.{COMMANDS[name]}", __package__)
+    there = [name for name in COMMANDS if name != "lab" or has_lab()]
+    for name in [command] if command in there else there:
+        words = import_module(f".{COMMANDS[name]}", __package__)
         getattr(words, f"add_{name.replace('-', '_')}")(commands)
     purposes = {name: below.description or "" for name, below in commands.choices.items()}
     about = "Makes 3D scenes from photos without poses, and finds things in them by words."
     parser.description = f"{about}\n\n{in_groups(purposes)}"
     return parser
+
+
+def has_lab() -> bool:
+    """Whether the commands that make and judge weights are here: a wheel leaves them out."""
+    return find_spec(f"{__package__}.lab") is not None
+
+
+def lab_remedy(command: str = "") -> str:
+    """What helps somebody who asks for the lab or for a command of it."""
+    said = " ".join(("langflash lab", command)).strip()
+    if has_lab():
+        return f'did you mean "{said}"?'
+    return f'"{said}" runs in a checkout of the repository, after pip install -e ".[training]"'
 
 
 def nearest(word: str, commands: Iterable[str]) -> str | None:
@@ -98,8 +113,3 @@ def nearest(word: str, commands: Iterable[str]) -> str | None:
     said, names = word.lower(), list(commands)
     begun = [name for name in names if len(said) > 1 and name.startswith(said)]
     return next(iter(begun or get_close_matches(said, names, 1)), None)
-
-
-def joined(words: Sequence[str]) -> list[str]:
-    """`bench network` is a command of its own, though `bench` takes a scene; ./network names a file."""
-    return ["bench-network", *words[2:]] if list(words[:2]) == ["bench", "network"] else list(words)

@@ -12,7 +12,7 @@ from langflash_core.errors import LangFlashError
 from langflash_core.extras import optional_packages
 
 from .overview import LAB, first_day
-from .parser import build_parser, joined
+from .parser import build_parser
 from .report import INTERRUPTED, explained, say_error
 
 # Imports make a million objects that stay; looking for garbage among them, as Python would do
@@ -50,7 +50,7 @@ def main(argv: Sequence[str] | None = None) -> int:
 
 def _run(argv: Sequence[str] | None) -> int:
     try:
-        words = joined(sys.argv[1:] if argv is None else argv)
+        words = list(sys.argv[1:] if argv is None else argv)
         if not words:
             print(first_day())
             return 0

@@ -3,7 +3,7 @@
 A basis of d directions (principal components of feature vectors, not centred, since splatting is linear and
 empty space is 0), and a decoder of one hidden layer, whose units are drawn at random and whose output is a
 ridge regression: closed form. LSM splats few channels and decodes them by a trained network of this kind.
-Scenes here hold atoms; this is what they are measured against (`langflash bench`, `langflash eval
+Scenes here hold atoms; this is what they are measured against (`langflash bench`, `langflash lab eval
 ablations`). C channels, d of them kept, h hidden units.
 """
 

@@ -55,7 +55,7 @@ def _network(preset: str, side: int, folder: Path, quick: bool, card: bool, comp
     name = f"network-{preset}" + ("-compiled" if compiled else "")
     written = folder / f"{name}.json"
     command = (
-        "-m", "langflash_core", "bench", "network", "--preset", preset, "--random", "--device",
+        "-m", "langflash_core", "lab", "bench-network", "--preset", preset, "--random", "--device",
         "cuda" if card else "cpu", "--size", str(side), "--views", "2", "--repeats", "1" if quick else "20",
         "-o", str(written), *(("--compile",) if compiled else ()), *(() if card else ("--float32",)),
     )  # fmt: skip

@@ -132,7 +132,7 @@ def _making() -> Iterator[Job]:
     yield Job("batch", _inline(*batch), _inline(*batch, "--fov", "40"), FILES, same=False)
     labels = _inline("labels", "in/clips", "-o", "out/labels", "--workers", "1")
     yield Job("labels", labels, labels, FILES, same=False)
-    train = ("train", "run", "in/cache", "-o", "out/run", "--stages", "depth", "--minutes", "1")
+    train = ("lab", "train", "run", "in/cache", "-o", "out/run", "--stages", "depth", "--minutes", "1")
     train, kinds = (*train, "--max-steps", "1"), (*FILES, "memory", "disk")  # torch writes by itself
     yield Job("train run", command(*train), command(*train, "--seed", "5"), kinds, same=False)
 

@@ -1,4 +1,4 @@
-"""`langflash bench-network`: how long each stage of the network takes, and what bfloat16 costs."""
+"""`langflash lab bench-network`: how long each stage of the network takes, and what bfloat16 costs."""
 
 import math
 import platform

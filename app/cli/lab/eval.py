@@ -1,4 +1,4 @@
-"""`langflash eval`: how good a checkpoint is on rooms and photos it has never seen, and how it looks."""
+"""`langflash lab eval`: how good a checkpoint is on rooms and photos it has never seen, and how it looks."""
 
 import io
 import logging
@@ -66,7 +66,7 @@ def run(args: Namespace, out: TextIO) -> None:
 
 def _check_cache(args: Namespace) -> None:
     if not args.cache.is_dir():
-        raise InputError(f"there is no folder {args.cache}; make it with langflash train cache")
+        raise InputError(f"there is no folder {args.cache}; make it with langflash lab train cache")
 
 
 def _rooms(args: Namespace, out: TextIO) -> None:

@@ -1,4 +1,4 @@
-"""What a worker of `langflash labels` does with one clip."""
+"""What a worker of `langflash lab labels` does with one clip."""
 
 import contextlib
 import io

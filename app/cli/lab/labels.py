@@ -1,4 +1,4 @@
-"""`langflash labels`: what is where in every frame of clips, and what it is."""
+"""`langflash lab labels`: what is where in every frame of clips, and what it is."""
 
 from argparse import Namespace
 from collections.abc import Callable, Sequence

@@ -1,4 +1,4 @@
-"""`langflash rooms`: furnished rooms for training and tests."""
+"""`langflash lab rooms`: furnished rooms for training and tests."""
 
 from argparse import Namespace
 from typing import TextIO

@@ -1,4 +1,4 @@
-"""`langflash train`: render and encode rooms, train stages, join them into one checkpoint."""
+"""`langflash lab train`: render and encode rooms, train stages, join them into one checkpoint."""
 
 import json
 import logging
@@ -140,9 +140,9 @@ def _opinions(args: Namespace, out: TextIO) -> None:
 
 def _parts(args: Namespace, out: TextIO) -> None:
     if not args.cache.is_dir():
-        raise InputError(f"there is no folder {args.cache}; make it with langflash train cache")
+        raise InputError(f"there is no folder {args.cache}; make it with langflash lab train cache")
     if args.run is not None and not args.run.is_dir():
-        raise InputError(f"there is no folder {args.run}; make it with langflash train run")
+        raise InputError(f"there is no folder {args.run}; make it with langflash lab train run")
     count = run_find_parts(args.cache, _start(args), args.run, part=args.part, preset=args.preset)
     print(f"{args.cache}: {count} new parts", file=out)
 
@@ -177,7 +177,7 @@ def _second(args: Namespace, out: TextIO) -> None:
 
 def _labelled(args: Namespace) -> PhotoFolder:
     if not args.cache.is_dir():
-        raise InputError(f"there is no folder {args.cache}; make it with langflash train cache")
+        raise InputError(f"there is no folder {args.cache}; make it with langflash lab train cache")
     check_folder(args.output)
     folder = opened_folder(args)
     if not folder.labelled:
@@ -226,7 +226,7 @@ def _faster(args: Namespace) -> dict[str, Any]:
 
 def _run(args: Namespace, out: TextIO) -> None:
     if args.scenes is None and not args.cache.is_dir():
-        raise InputError(f"there is no folder {args.cache}; make it with langflash train cache")
+        raise InputError(f"there is no folder {args.cache}; make it with langflash lab train cache")
     if args.labels is not None and args.scenes is None:
         raise InputError("--labels are of clips; name their folder with --scenes")
     if args.outlined and args.scenes is not None:
@@ -292,7 +292,7 @@ def _recipe(args: Namespace, options: LoopOptions) -> Recipe:
 
 def _export(args: Namespace, out: TextIO) -> None:
     if not args.run.is_dir():
-        raise InputError(f"there is no folder {args.run}; make it with langflash train run")
+        raise InputError(f"there is no folder {args.run}; make it with langflash lab train run")
     check_output_file(args.output, (".safetensors",))
     details = None if args.metadata is None else _details(args.metadata)
     path = run_export(

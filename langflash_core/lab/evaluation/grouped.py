@@ -1,6 +1,6 @@
-"""`langflash eval grouping`: how well groups and parts of single real photos follow what is in them.
+"""`langflash lab eval grouping`: how well groups and parts of single real photos follow what is in them.
 
-The truth is a folder that is named (connected regions of a name) or outlined (`langflash train outlines`);
+The truth is a folder that is named (connected regions of a name) or outlined (`lab train outlines`);
 what nobody named or outlined is not judged. Groups are what the queries answer, parts what they are cut into
 and what atoms are made of; each pixel is its likeliest one's.
 

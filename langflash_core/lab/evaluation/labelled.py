@@ -1,4 +1,4 @@
-"""`langflash eval photos-labelled`: the whole program on single real photos that somebody labelled.
+"""`langflash lab eval photos-labelled`: the whole program on single real photos that somebody labelled.
 
 Each photo is reconstructed, its scene drawn from the photo's own camera, and asked as anybody would ask
 it. Names are judged on the drawn atoms and, beside them, on the language features of the photo alone; the

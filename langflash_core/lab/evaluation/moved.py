@@ -1,4 +1,4 @@
-"""`langflash eval moved`: two scenes of one room, between which things were moved.
+"""`langflash lab eval moved`: two scenes of one room, between which things were moved.
 
 A room is drawn from its seed; three things that stand on its floor are then pushed to other free places,
 with what stands on them. Each scene has three photos, of which two are from the same places. A moved thing

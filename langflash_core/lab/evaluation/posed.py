@@ -1,4 +1,4 @@
-"""`langflash eval posed`: pairs of real photos whose poses somebody measured.
+"""`langflash lab eval posed`: pairs of real photos whose poses somebody measured.
 
 Two photos some numbers apart make a scene; a third from between them, which the network does not see, is
 drawn from its true place. Lengths of a scene are brought to metres by the first photo's depth, or by the

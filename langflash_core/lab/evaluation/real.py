@@ -1,4 +1,4 @@
-"""`langflash eval real`: real frames of a place, in order and without poses, as any film gives them.
+"""`langflash lab eval real`: real frames of a place, in order and without poses, as any film gives them.
 
 Of 2 N - 1 frames the first, third, fifth ... make a scene; the others are held back. All poses and the lens
 come from one reconstruction of all, so that a frame that was held back is drawn from where it was taken.

@@ -1,4 +1,4 @@
-"""Results of `langflash eval real` as markdown: a column for the scene, one for what fewer photos bring."""
+"""Results of `lab eval real` as markdown: a column for the scene, one for what fewer photos bring."""
 
 import math
 from collections.abc import Mapping

@@ -1,4 +1,4 @@
-"""`langflash eval report`: every set that is at hand, judged scene by scene, as sections of one report.
+"""`langflash lab eval report`: every set that is at hand, judged scene by scene, as sections of one report.
 
 Each section is what the command of its name judges (`eval rooms`, `posed`, `photos-labelled`), with an
 interval of every number, pictures, and a plot of speed against error. What is kept in the work folder is

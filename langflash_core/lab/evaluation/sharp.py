@@ -1,4 +1,4 @@
-"""`langflash eval sharp`: how near a scene's picture is to its photo at the photo's size.
+"""`langflash lab eval sharp`: how near a scene's picture is to its photo at the photo's size.
 
 A scene is drawn from each of its photos' own places at the photo's size, at most three times the network's
 grid, and from where kept photos were taken. Two rivals stand beside it in the same run: "grid", the photo

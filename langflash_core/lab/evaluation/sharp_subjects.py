@@ -1,4 +1,4 @@
-"""What `langflash eval sharp` judges: photos to make scenes of, and kept photos from between.
+"""What `langflash lab eval sharp` judges: photos to make scenes of, and kept photos from between.
 
 Photos are larger than the network's grid, and compared at their own size (`sharp_size`).
 """
@@ -149,7 +149,7 @@ def room_subjects(
     first: int | None = None,
     times: int = MOST_ENLARGED,
 ) -> Iterator[Subject]:
-    """Rooms of a set of `langflash train cache`, made again from their seeds, `times` as large, with their
+    """Rooms of a set of `lab train cache`, made again from their seeds, `times` as large, with their
     third view as the photo from between.
 
     Args:

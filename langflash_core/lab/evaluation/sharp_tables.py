@@ -1,4 +1,4 @@
-"""Results of `langflash eval sharp` as tables: columns beside each other, and paired differences."""
+"""Results of `langflash lab eval sharp` as tables: columns beside each other, and paired differences."""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence

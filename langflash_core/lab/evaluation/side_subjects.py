@@ -1,4 +1,4 @@
-"""What `langflash eval sides` walks around: photos, and true looks from places that no photo was taken at.
+"""What `lab eval sides` walks around: photos, and true looks from places that no photo was taken at.
 
 A *look* is a picture and its true depth from a known place. World: the first photo's camera, metres.
 """
@@ -102,7 +102,7 @@ def carried(view: DepthView, way: str, degrees: float, up: Float[np.ndarray, " 3
 def room_cases(
     pack: Pack, renderer: RoomRenderer, *, kind: str = "held_out", count: int = 100, first: int | None = None
 ) -> Iterator[Case]:
-    """Rooms of a set of `langflash train cache`, made again from their seeds: the same photos.
+    """Rooms of a set of `langflash lab train cache`, made again from their seeds: the same photos.
 
     Args:
         kind: "held_out" or "validation". first: seed of the first room; None: the set's own.

@@ -1,4 +1,4 @@
-"""Results of `langflash eval sides` as markdown: one version, or two on the same rooms and pairs."""
+"""Results of `langflash lab eval sides` as markdown: one version, or two on the same rooms and pairs."""
 
 import math
 from collections.abc import Iterator, Sequence

@@ -1,4 +1,4 @@
-"""`langflash eval sides`: scenes seen from aside, in rooms that can be drawn from anywhere and real photos.
+"""`lab eval sides`: scenes seen from aside, in rooms that can be drawn from anywhere and real photos.
 
 Two photos go through the whole program. The scene is brought into the true world by one similarity, fitted
 to the surfaces that both photos draw (`fitted_similarity`), so that a wrong pose or scale is not counted

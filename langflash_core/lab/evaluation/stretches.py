@@ -1,4 +1,4 @@
-"""`langflash eval posed --photos 2 4 8`: what more photos of the same place bring.
+"""`langflash lab eval posed --photos 2 4 8`: what more photos of the same place bring.
 
 A stretch is a run of photos; scenes are made of 2, 4, 8 ... of them, spread evenly from its first to its
 last. All are judged alike: by the depth of the first photo, the pose of the last one (so that drift along

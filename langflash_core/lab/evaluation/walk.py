@@ -1,4 +1,4 @@
-"""`langflash eval walk`: the same place in 2, 4, 8 ... photos, and what every further photo brings.
+"""`langflash lab eval walk`: the same place in 2, 4, 8 ... photos, and what every further photo brings.
 
 A scene is made of the photos of a walk (`walk_subjects` says which), and brought into the true world by the
 similarity that fits its cameras best (`fitted_cameras`). Then its cameras, its depth in every photo and its

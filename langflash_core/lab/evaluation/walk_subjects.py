@@ -1,4 +1,4 @@
-"""What `langflash eval walk` goes along: a walk in 2, 4, 8 ... photos, and frames kept from all of them.
+"""What `langflash lab eval walk` goes along: a walk in 2, 4, 8 ... photos, and frames kept from all of them.
 
 A walk is a row of frames, number 0 to `last`. Of `most`, the largest number of photos, there are two frames
 a photo: `last` = 2 (most - 1). Two rules say which frames are photos:
@@ -182,7 +182,7 @@ def room_walks(
     count: int = 20,
     first: int | None = None,
 ) -> Iterator[Walk]:
-    """Walks through the rooms of `langflash eval sides`; those without a free way are passed over.
+    """Walks through the rooms of `langflash lab eval sides`; those without a free way are passed over.
 
     Args:
         way: of `walk_rooms.WAYS`. count: of walks. first: seed of the first room; None: the set's own.

@@ -1,4 +1,4 @@
-"""Results of `langflash eval walk` as markdown: one version, or two along the same walks."""
+"""Results of `langflash lab eval walk` as markdown: one version, or two along the same walks."""
 
 import math
 from collections.abc import Iterator, Mapping, Sequence

@@ -29,7 +29,7 @@ def open_collected(clip: Path, labelled: Path) -> CollectedFolder:
     """A clip (`images/`, `K.txt`, `poses.txt`) with its labels.
 
     Args:
-        labelled: the clip's own folder of those that `langflash labels` writes.
+        labelled: the clip's own folder of those that `langflash lab labels` writes.
 
     Raises:
         InputError: labels are missing, damaged, or of other frames; or a pose is not known.

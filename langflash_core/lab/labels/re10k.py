@@ -44,7 +44,7 @@ def enrich(split: Path, labelled: Path, keys: Collection[str] | None = None) -> 
 
     Args:
         split: folder with index.json and chunks. labelled: folder with a folder a video, as
-            `langflash labels` fills it. keys: only these videos.
+            `langflash lab labels` fills it. keys: only these videos.
 
     Returns:
         How many videos hold those labels now.

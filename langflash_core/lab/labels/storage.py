@@ -138,7 +138,7 @@ def read_labels(path: Path) -> ClipLabels:
         streams = [content[a:b] for a, b in itertools.pairwise(ends)]
         return unpacked(header["labels"], streams, tensors["vectors"])
     except FileNotFoundError:
-        raise InputError(f"there are no labels at {path}; make them with langflash labels") from None
+        raise InputError(f"there are no labels at {path}; make them with langflash lab labels") from None
     except (SafetensorError, KeyError, ValueError, TypeError, OSError, IndexError) as error:
         raise InputError(f"{path} holds no labels of a clip ({error}); make them again") from None
 

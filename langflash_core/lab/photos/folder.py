@@ -234,7 +234,7 @@ def open_folder(root: Path) -> PhotoFolder:
     images = root / "images"
     if not images.is_dir():
         raise InputError(
-            f"there is no folder {images}; give a folder of photos as langflash train photos makes"
+            f"there is no folder {images}; give a folder of photos as langflash lab train photos makes"
         )
     ids = sorted((p.stem for p in images.iterdir() if p.suffix.lower() in PHOTO_SUFFIXES), key=order)
     if not ids:

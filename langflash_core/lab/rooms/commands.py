@@ -1,4 +1,4 @@
-"""What `langflash rooms pack | preview | render` do. Files are written whole or not at all."""
+"""What `langflash lab rooms pack | preview | render` do. Files are written whole or not at all."""
 
 import io
 from collections.abc import Iterator

@@ -124,13 +124,13 @@ def load_pack(path: Path) -> Pack:
         InputError: missing, or not a pack of this version.
     """
     if not path.is_file():
-        raise InputError(f"there is no room pack at {path}; build one with `langflash rooms pack`")
+        raise InputError(f"there is no room pack at {path}; build one with `langflash lab rooms pack`")
     try:
         with path.open("rb") as file, np.load(file) as arrays:
             stored = {name: arrays[name] for name in arrays.files}
         header = json.loads(stored["header"].tobytes())
     except (ValueError, KeyError, OSError, zipfile.BadZipFile, lzma.LZMAError) as error:
-        raise InputError(f"{path} is not a room pack; build one with `langflash rooms pack`") from error
+        raise InputError(f"{path} is not a room pack; build one with `langflash lab rooms pack`") from error
     if header["format"] != FORMAT:
         raise InputError(f"{path} has pack format {header['format']}, expected {FORMAT}; build it again")
     return _decode(stored, tuple(_item_from(entry) for entry in header["items"]))

@@ -1,4 +1,4 @@
-"""`langflash train ...`: cache rooms, train stages on rooms and photos, export weights.
+"""`langflash lab train ...`: cache rooms, train stages on rooms and photos, export weights.
 
 Plain functions; the command line only parses arguments. Text embeddings come in as a function, because
 training does not import the query stage.
@@ -114,7 +114,7 @@ def run_cache(
     Single-threaded: run one process per core with `part` (i, n). Interrupted runs continue.
 
     Args:
-        pack: furniture (`langflash rooms pack`).
+        pack: furniture (`langflash lab rooms pack`).
         start: weights file of the preset, whose encoder is used; None where the cache keeps no tokens.
     """
     torch.set_num_threads(1)

@@ -180,7 +180,7 @@ class PartSet:
         paths = [path for folder in folders for path in sorted(folder.glob("*.safetensors"))]
         if not any(path.parent == folders[0] for path in paths):
             raise ValueError(
-                f"folder: expected parts in {folders[0]}, found none; run `langflash train parts`"
+                f"folder: expected parts in {folders[0]}, found none; run `langflash lab train parts`"
             )
         self.rooms = [room for path in paths for room in _read(path).rooms()]
 

@@ -136,7 +136,7 @@ def re10k_source(root: Path) -> SceneSource:
         if not scenes:
             raise InputError(
                 f"{root / unit} holds no labels of its videos, without which nothing can be learned of what "
-                "things are; collect them with langflash labels"
+                "things are; collect them with langflash lab labels"
             )
         return scenes
 
@@ -147,7 +147,7 @@ def clip_source(clips: Path, labelled: Path) -> SceneSource:
     """Posed clips, a unit each, of which those with labels are read.
 
     Args:
-        clips: a clip, or a folder of them. labelled: what `langflash labels` wrote of them.
+        clips: a clip, or a folder of them. labelled: what `langflash lab labels` wrote of them.
 
     Raises:
         InputError: there are no clips, or no labels of any.
@@ -157,7 +157,7 @@ def clip_source(clips: Path, labelled: Path) -> SceneSource:
     }
     if not places:
         raise InputError(
-            f"{labelled} holds no labels of what lies in {clips}; collect them with langflash labels"
+            f"{labelled} holds no labels of what lies in {clips}; collect them with langflash lab labels"
         )
 
     def opened(unit: str) -> Sequence[Scene]:
@@ -171,7 +171,7 @@ def source_at(root: Path, labelled: Path | None = None) -> SceneSource:
     """The source that lies in a folder.
 
     Args:
-        labelled: of clips, what `langflash labels` wrote of them.
+        labelled: of clips, what `langflash lab labels` wrote of them.
 
     Raises:
         InputError: it is of no known layout.

@@ -31,7 +31,7 @@ _MODULES = {
 }
 """Of whatever a run can have trained."""
 
-_UNTRAINED = "holds no trained stage; run `langflash train run` first"
+_UNTRAINED = "holds no trained stage; run `langflash lab train run` first"
 
 
 def prepared(

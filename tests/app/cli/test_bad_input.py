@@ -298,7 +298,7 @@ def test_unknown_words(refused):
         ("exprot", "langflash export"),
         ("Query", "langflash query"),
         ("rec", "langflash reconstruct"),
-        ("bench-netwrok", "langflash bench-network"),
+        ("lab evla", "langflash lab eval"),
         ("tour stpo", "langflash tour stop"),
         ("weights lst", "langflash weights list"),
     ],
@@ -313,6 +313,14 @@ def test_a_word_close_to_no_command(refused, written):
     group = "langflash tour" if written.startswith("tour") else "langflash"
     sentence = f'langflash: "langflash {written}" is not a command; {group} --help lists them\n'
     assert refused(*written.split(" ")) == sentence
+
+
+@pytest.mark.parametrize("written", ["eval", "train", "rooms", "labels", "bench-network"])
+def test_a_command_of_the_lab_is_found_there(refused, written):
+    said = refused(written, "rooms")
+    assert (
+        said == f'langflash: "{written}" is a command of the lab; did you mean "langflash lab {written}"?\n'
+    )
 
 
 def test_from_a_shell(tmp_path):

@@ -1,4 +1,4 @@
-"""`langflash eval ablations` and `eval report` from end to end, on toy rooms and weights that are drawn."""
+"""`lab eval ablations` and `eval report` from end to end, on toy rooms and weights that are drawn."""
 
 import json
 from dataclasses import replace
@@ -31,7 +31,15 @@ def cache(tmp_path: Path, monkeypatch) -> Path:
 
 @pytest.mark.slow
 def test_ablations_go_on_from_what_is_kept(cache, tmp_path, capsys, monkeypatch):
-    words = ["eval", "ablations", str(cache), "--weights", str(tmp_path / "mini.safetensors"), "--json"]
+    words = [
+        "lab",
+        "eval",
+        "ablations",
+        str(cache),
+        "--weights",
+        str(tmp_path / "mini.safetensors"),
+        "--json",
+    ]
     words += ["--work", str(tmp_path / "work"), "-o", str(tmp_path / "tables.md")]
     assert main([*words, "--limit", "1"]) == 0
     first = json.loads(capsys.readouterr().out)
@@ -49,7 +57,7 @@ def test_ablations_go_on_from_what_is_kept(cache, tmp_path, capsys, monkeypatch)
 def test_a_report_of_rooms_and_a_scene_has_the_tables_that_documents_ask_for(
     cache, scene_file, context, tmp_path, monkeypatch
 ):
-    words = ["eval", "report", "-o", str(tmp_path / "report"), "--rooms", str(cache), "--limit", "1"]
+    words = ["lab", "eval", "report", "-o", str(tmp_path / "report"), "--rooms", str(cache), "--limit", "1"]
     words += ["--scene", str(scene_file)]
     words += ["--weights", str(tmp_path / "mini.safetensors"), "--small", str(tmp_path / "small")]
     monkeypatch.setattr("sys.argv", ["langflash", *words])
@@ -64,9 +72,12 @@ def test_a_report_of_rooms_and_a_scene_has_the_tables_that_documents_ask_for(
 
 
 def test_nothing_to_judge_is_one_sentence(tmp_path, capsys):
-    assert main(["eval", "report", "-o", str(tmp_path / "report")]) == 2
+    assert main(["lab", "eval", "report", "-o", str(tmp_path / "report")]) == 2
     assert "give --rooms, --pack, --posed, --photos or --scene" in capsys.readouterr().err
-    assert main(["eval", "report", "-o", str(tmp_path / "report"), "--scene", str(tmp_path / "no.ply")]) == 2
+    assert (
+        main(["lab", "eval", "report", "-o", str(tmp_path / "report"), "--scene", str(tmp_path / "no.ply")])
+        == 2
+    )
     assert capsys.readouterr().err.count("\n") == 1 and not any(tmp_path.iterdir())
 
 

@@ -1,4 +1,4 @@
-"""`langflash eval protocol` from end to end: the shipped network, and the paper's at a size for tests."""
+"""`langflash lab eval protocol` from end to end: the shipped network, and the paper's at a size for tests."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -49,7 +49,7 @@ def tiny_full(run, tmp_path, monkeypatch) -> Iterator[None]:
 
 
 def test_the_shipped_network_is_judged_and_what_is_kept_is_used_again(run, scannet: Path, tmp_path: Path):
-    words = ("eval", "protocol", "scannet", scannet, "--size", 84, "--backend", "torch", "--json")
+    words = ("lab", "eval", "protocol", "scannet", scannet, "--size", 84, "--backend", "torch", "--json")
     words = (*words, "--work", tmp_path / "work", "-o", tmp_path / "table.md")
     made_now = run(*words)
     assert made_now.code == 0, made_now.err
@@ -65,7 +65,7 @@ def test_the_papers_network_goes_from_end_to_end(run, wall, tiny_full, scannet: 
     made.re10k_split(made.wall(tmp_path / "five", 5), tmp_path / "re10k")
     options = ("--preset", "full", "--size", 64, "--backend", "torch", "--json", "--limit", 1)
     for name, folder in (("scannet", scannet), ("3dovs", tmp_path / "3dovs"), ("re10k", tmp_path / "re10k")):
-        outcome = run("eval", "protocol", name, folder, *options)
+        outcome = run("lab", "eval", "protocol", name, folder, *options)
         assert outcome.code == 0, outcome.err
         assert outcome.json()["cases"] == 1
 
@@ -74,10 +74,10 @@ def test_the_shipped_network_goes_through_the_other_protocols(run, wall, tmp_pat
     made.masked_scene(made.wall(tmp_path / "four", 4), tmp_path / "3dovs" / "bed")
     made.re10k_split(made.wall(tmp_path / "five", 5), tmp_path / "re10k")
     options = ("--size", 84, "--backend", "torch", "--json", "--limit", 1, "--align")
-    masked = run("eval", "protocol", "3dovs", tmp_path / "3dovs", *options)
+    masked = run("lab", "eval", "protocol", "3dovs", tmp_path / "3dovs", *options)
     assert masked.code == 0, masked.err
     assert set(masked.json()["labels"]) == {"atoms", "features"} and masked.json()["cases"] == 1
-    posed = run("eval", "protocol", "re10k", tmp_path / "re10k", *options)
+    posed = run("lab", "eval", "protocol", "re10k", tmp_path / "re10k", *options)
     assert posed.code == 0, posed.err
     measures = posed.json()["measures"]
     # Of the poses tried the best is taken, the true one among them; four digits are kept.
@@ -85,7 +85,20 @@ def test_the_shipped_network_goes_through_the_other_protocols(run, wall, tmp_pat
 
 
 def test_nyu_goes_on_from_what_it_kept_and_has_no_other_view(run, wall: PhotoFolder, tmp_path: Path):
-    words = ("eval", "protocol", "nyu", wall.root, "--size", 84, "--backend", "torch", "--json", "--limit", 1)
+    words = (
+        "lab",
+        "eval",
+        "protocol",
+        "nyu",
+        wall.root,
+        "--size",
+        84,
+        "--backend",
+        "torch",
+        "--json",
+        "--limit",
+        1,
+    )
     first = run(*words, "--work", tmp_path / "work")
     assert first.code == 0, first.err
     assert run(*words, "--work", tmp_path / "work").json() == first.json()  # seconds too
@@ -96,14 +109,14 @@ def test_nyu_goes_on_from_what_it_kept_and_has_no_other_view(run, wall: PhotoFol
 
 def test_nyu_takes_a_folder_and_refuses_what_is_none(run, wall: PhotoFolder, tmp_path: Path):
     words = ("--size", 84, "--backend", "torch", "--json", "--limit", 1)
-    outcome = run("eval", "protocol", "nyu", wall.root, *words)
+    outcome = run("lab", "eval", "protocol", "nyu", wall.root, *words)
     assert outcome.code == 0, outcome.err
     assert "classes_miou" in outcome.json()["labels"]["atoms"]
-    absent = run("eval", "protocol", "nyu", tmp_path / "nothing", *words)
+    absent = run("lab", "eval", "protocol", "nyu", tmp_path / "nothing", *words)
     assert absent.code == 2 and "nyu_depth_v2_labeled.mat" in absent.err
 
 
 def test_an_absent_data_set_is_one_sentence(run, tmp_path: Path):
-    absent = run("eval", "protocol", "scannet", tmp_path / "nothing")
+    absent = run("lab", "eval", "protocol", "scannet", tmp_path / "nothing")
     assert absent.code == 2 and absent.err.count("\n") == 1 and "scannet_test.tar" in absent.err
-    assert run("eval", "protocol", "kitti", tmp_path).code == 2
+    assert run("lab", "eval", "protocol", "kitti", tmp_path).code == 2

@@ -1,4 +1,4 @@
-"""`langflash eval sharp` on a small pair, one version beside another."""
+"""`langflash lab eval sharp` on a small pair, one version beside another."""
 
 import json
 
@@ -22,7 +22,7 @@ def pair(tmp_path):
 
 def test_a_pair_is_judged_kept_and_judged_beside_what_was_kept(run, pair, tmp_path):
     kept, sheet, results = tmp_path / "kept", tmp_path / "new" / "sheet.png", tmp_path / "results"
-    words = ("eval", "sharp", pair, "--size", "56")
+    words = ("lab", "eval", "sharp", pair, "--size", "56")
     outcome = run(*words, "--keep", kept, "--sheet", sheet, "--results", results, "--json")
     assert outcome.code == 0, outcome.err
     document = outcome.json()
@@ -49,6 +49,6 @@ def test_a_pair_is_judged_kept_and_judged_beside_what_was_kept(run, pair, tmp_pa
 
 def test_a_scene_that_is_not_beside_is_named(run, pair, tmp_path):
     (tmp_path / "other").mkdir()
-    words = ("eval", "sharp", pair, "--size", "56", "--beside", tmp_path / "other")
+    words = ("lab", "eval", "sharp", pair, "--size", "56", "--beside", tmp_path / "other")
     outcome = run(*words)
     assert outcome.code == 2 and "toy.langflash" in outcome.err and outcome.err.count("\n") == 1

@@ -84,7 +84,7 @@ def test_what_cannot_be_done_is_one_sentence(run, checkpoints, tmp_path):
 def test_the_stage_table_of_the_network(run, tmp_path):
     out = tmp_path / "network.json"
     words = ("--random", "--views", 2, 3, "--atoms", 4, 9, "--repeats", 1, "--size", 64, "-o", out)
-    document = run("bench", "network", *words, "--json").json()
+    document = run("lab", "bench-network", *words, "--json").json()
     rows = {(r["precision"], r["views"], r["atoms"], r["stage"]): r for r in document["rows"]}
     assert len(rows) == 2 * 2 * 2 * 6 and out.is_file()
     for (precision, views, atoms, stage), row in rows.items():
@@ -94,7 +94,7 @@ def test_the_stage_table_of_the_network(run, tmp_path):
         if precision == "bfloat16" and stage != "all":
             # 8 bits a number, and some thirty layers of random weights: a few per cent.
             assert 0 <= row["error"] < 0.3
-    table = run("bench", "network", *words, "--float32").out
+    table = run("lab", "bench-network", *words, "--float32").out
     assert "| float32 | 3 | 9 | aggregation |" in table and "bfloat16" not in table
-    refused = run("bench", "network", "--random", "--size", 100)
+    refused = run("lab", "bench-network", "--random", "--size", 100)
     assert refused.code == 2 and "multiple of 16" in refused.err

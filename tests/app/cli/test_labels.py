@@ -1,4 +1,4 @@
-"""`langflash labels`: a folder of clips, each once, with our own network alone."""
+"""`langflash lab labels`: a folder of clips, each once, with our own network alone."""
 
 import csv
 import json
@@ -40,7 +40,7 @@ def clips(tmp_path_factory) -> Path:
 @pytest.fixture(scope="module")
 def made(clips: Path) -> Path:
     out = clips.parent / "out"
-    assert main(["labels", str(clips), "-o", str(out)]) == 1  # one of them is broken
+    assert main(["lab", "labels", str(clips), "-o", str(out)]) == 1  # one of them is broken
     return out
 
 
@@ -70,12 +70,12 @@ def test_an_object_of_a_sliding_window_keeps_its_number(made):
 def test_what_is_done_is_not_done_again_and_what_changed_is(made, clips, tmp_path, capsys):
     clips, made = (shutil.copytree(each, tmp_path / each.name) for each in (clips, made))
     before = {name: (made / name / LABELS).stat().st_mtime_ns for name in ("desk", "toy")}
-    assert main(["labels", str(clips), "-o", str(made), "--json"]) == 1
+    assert main(["lab", "labels", str(clips), "-o", str(made), "--json"]) == 1
     assert json.loads(capsys.readouterr().out)["done_before"] == 2
     assert before == {name: (made / name / LABELS).stat().st_mtime_ns for name in before}
     write_clip(clips / "toy2" / "images", "toy", 2)
     Image.fromarray(np.zeros((126, 168, 3), np.uint8)).save(clips / "toy" / "images" / "001.png")
-    main(["labels", str(clips), "-o", str(made), "--workers", "1", "--json"])
+    main(["lab", "labels", str(clips), "-o", str(made), "--workers", "1", "--json"])
     assert json.loads(capsys.readouterr().out)["done"] == 3
     after = {name: (made / name / LABELS).stat().st_mtime_ns for name in before}
     assert after["desk"] == before["desk"] and after["toy"] > before["toy"]
@@ -85,7 +85,7 @@ def test_what_is_done_is_not_done_again_and_what_changed_is(made, clips, tmp_pat
 def test_chunks_that_were_enriched_are_not_labelled_again(tmp_path, capsys):
     layouts_made.re10k_split(layouts_made.wall(tmp_path / "photos", 2), tmp_path / "re10k")
     split, out = tmp_path / "re10k" / "test", tmp_path / "out"
-    command = ["labels", str(split), "-o", str(out), "--enrich", "--json"]
+    command = ["lab", "labels", str(split), "-o", str(out), "--enrich", "--json"]
     assert main(command) == 0
     first = json.loads(capsys.readouterr().out)
     assert (first["done_before"], first["enriched"]) == (0, 2)
@@ -93,7 +93,7 @@ def test_chunks_that_were_enriched_are_not_labelled_again(tmp_path, capsys):
     assert main(command) == 0
     assert json.loads(capsys.readouterr().out)["done_before"] == 2
     assert (split / "000000.torch").stat().st_mtime_ns == written
-    assert main(["labels", str(split), "-o", str(tmp_path / "back"), "--extract"]) == 0
+    assert main(["lab", "labels", str(split), "-o", str(tmp_path / "back"), "--extract"]) == 0
     for key in ("aaaa", "bbbb"):
         old, new = (read_labels(folder / key / LABELS).ids for folder in (out, tmp_path / "back"))
         assert np.array_equal(old, new)
@@ -111,7 +111,7 @@ def test_chunks_that_were_enriched_are_not_labelled_again(tmp_path, capsys):
     ],
 )
 def test_what_cannot_be_is_one_sentence_and_nothing_is_written(clips, tmp_path, capsys, options, sentence):
-    assert main(["labels", str(clips), "-o", str(tmp_path / "out"), *options]) == 2
+    assert main(["lab", "labels", str(clips), "-o", str(tmp_path / "out"), *options]) == 2
     assert sentence in capsys.readouterr().err and not (tmp_path / "out").exists()
 
 
@@ -119,11 +119,11 @@ def test_what_cannot_be_is_one_sentence_and_nothing_is_written(clips, tmp_path, 
 def test_why_one_clip_failed_is_said_once(clips, tmp_path, capsys, options):
     """A table of workers says it in its row."""
     with in_this_process():
-        words = ["labels", str(clips / "broken"), "-o", str(tmp_path / "out"), *options]
+        words = ["lab", "labels", str(clips / "broken"), "-o", str(tmp_path / "out"), *options]
         assert main(words) == 1
     assert capsys.readouterr().err.count("001.png") == 1
 
 
 def test_frames_are_not_written_over(clips, capsys):
-    assert main(["labels", str(clips), "-o", str(clips)]) == 2
+    assert main(["lab", "labels", str(clips), "-o", str(clips)]) == 2
     assert "choose another -o" in capsys.readouterr().err

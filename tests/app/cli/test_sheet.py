@@ -37,7 +37,7 @@ def test_between_runs_from_one_pose_to_the_other():
 @pytest.mark.slow
 def test_a_pair_fills_a_sheet(run, tmp_path):
     sheet = tmp_path / "sheet.png"
-    outcome = run("eval", "photos", *PAIR, "-o", sheet, "--prompt", "plant", "trombone")
+    outcome = run("lab", "eval", "photos", *PAIR, "-o", sheet, "--prompt", "plant", "trombone")
     assert outcome.code == 0 and "1 pair" in outcome.out
     with Image.open(sheet) as picture:
         pixels = np.asarray(picture.convert("RGB")).astype(int)
@@ -59,6 +59,6 @@ def test_a_pair_fills_a_sheet(run, tmp_path):
 )
 def test_bad_pairs(run, tmp_path, monkeypatch, words, hint):
     monkeypatch.chdir(tmp_path)
-    outcome = run("eval", "photos", *words)
+    outcome = run("lab", "eval", "photos", *words)
     assert outcome.code == 2 and hint in outcome.err and outcome.err.count("\n") == 1
     assert not list(tmp_path.iterdir())

@@ -9,8 +9,8 @@ import torch
 from PIL import Image
 from safetensors.torch import save_file
 
+from app.cli.lab.words.training import LAYOUTS
 from app.cli.parser import build_parser
-from app.cli.words.training import LAYOUTS
 from langflash_core.lab.photos import layouts
 from langflash_core.lab.photos.writing import FolderWriter
 from langflash_core.lab.training.shards import Label, open_shards, write_shard
@@ -37,14 +37,14 @@ def checkpoint(tmp_path_factory):
 
 def test_rooms_preview(run, tmp_path):
     path = tmp_path / "new" / "sheet.png"
-    outcome = run("rooms", "preview", TINY_PACK, "-o", path, "--count", "1", "--held-out")
+    outcome = run("lab", "rooms", "preview", TINY_PACK, "-o", path, "--count", "1", "--held-out")
     assert outcome.code == 0, outcome.err
     assert np.asarray(Image.open(path)).std() > 10  # something was drawn
 
 
 def test_rooms_render(run, tmp_path):
     words = ("--count", "2", "--seed", "3", "--views", "3", "--size", "70x56", "--held-out")
-    outcome = run("rooms", "render", TINY_PACK, "-o", tmp_path / "rooms", *words)
+    outcome = run("lab", "rooms", "render", TINY_PACK, "-o", tmp_path / "rooms", *words)
     assert outcome.code == 0, outcome.err
     files = sorted((tmp_path / "rooms").iterdir())
     assert [path.name for path in files] == ["room_00000003.npz", "room_00000004.npz"]
@@ -69,28 +69,34 @@ def test_weights_verify_notices_damage(run, checkpoint, tmp_path):
 @pytest.mark.parametrize(
     ("words", "hint"),
     [
-        (["rooms", "pack", "gone", "-o", "p.npz"], "there is no folder gone"),
-        (["rooms", "preview", "gone.npz", "-o", "a.png"], "no furniture pack at gone.npz"),
-        (["rooms", "render", "gone.npz", "-o", "out"], "no furniture pack at gone.npz"),
-        (["rooms", "render", TINY_PACK, "-o", "out", "--count", "0"], "--count"),
-        (["train", "cache", "gone.npz", "-o", "out"], "no furniture pack at gone.npz"),
-        (["train", "cache", TINY_PACK, "-o", "out", "--start", "gone"], "no weights file at gone"),
-        (["train", "cache", TINY_PACK, "-o", "out", "--part", "2/2"], "--part"),
-        (["train", "adopt", "gone", "gone", "-o", "w.safetensors"], "no encoder checkpoint at gone"),
+        (["lab", "rooms", "pack", "gone", "-o", "p.npz"], "there is no folder gone"),
+        (["lab", "rooms", "preview", "gone.npz", "-o", "a.png"], "no furniture pack at gone.npz"),
+        (["lab", "rooms", "render", "gone.npz", "-o", "out"], "no furniture pack at gone.npz"),
+        (["lab", "rooms", "render", TINY_PACK, "-o", "out", "--count", "0"], "--count"),
+        (["lab", "train", "cache", "gone.npz", "-o", "out"], "no furniture pack at gone.npz"),
+        (["lab", "train", "cache", TINY_PACK, "-o", "out", "--start", "gone"], "no weights file at gone"),
+        (["lab", "train", "cache", TINY_PACK, "-o", "out", "--part", "2/2"], "--part"),
+        (["lab", "train", "adopt", "gone", "gone", "-o", "w.safetensors"], "no encoder checkpoint at gone"),
         (
-            ["train", "run", "gone", "-o", "out", "--stages", "depth", "--minutes", "1"],
+            ["lab", "train", "run", "gone", "-o", "out", "--stages", "depth", "--minutes", "1"],
             "there is no folder gone",
         ),
-        (["train", "run", "gone", "-o", "out", "--stages", "depth", "--minutes", "0"], "--minutes"),
-        (["train", "run", ".", "-o", "out"], "either --stages with --minutes, or a --recipe"),
-        (["train", "run", ".", "-o", "out", "--stages", "depth"], "either --stages with --minutes"),
+        (["lab", "train", "run", "gone", "-o", "out", "--stages", "depth", "--minutes", "0"], "--minutes"),
+        (["lab", "train", "run", ".", "-o", "out"], "either --stages with --minutes, or a --recipe"),
+        (["lab", "train", "run", ".", "-o", "out", "--stages", "depth"], "either --stages with --minutes"),
         (
-            ["train", "run", ".", "-o", "out", "--recipe", "paper", "--minutes", "1"],
+            ["lab", "train", "run", ".", "-o", "out", "--recipe", "paper", "--minutes", "1"],
             "either --stages with --minutes",
         ),
-        (["train", "run", ".", "-o", "out", "--recipe", "gone"], "there is no recipe 'gone'; choose paper"),
-        (["train", "run", ".", "-o", "out", "--recipe", "paper", "--batches", "2"], "says itself"),
-        (["train", "run", ".", "-o", "out", "--stages", "taste", "--minutes", "1"], "no stage 'taste'"),
+        (
+            ["lab", "train", "run", ".", "-o", "out", "--recipe", "gone"],
+            "there is no recipe 'gone'; choose paper",
+        ),
+        (["lab", "train", "run", ".", "-o", "out", "--recipe", "paper", "--batches", "2"], "says itself"),
+        (
+            ["lab", "train", "run", ".", "-o", "out", "--stages", "taste", "--minutes", "1"],
+            "no stage 'taste'",
+        ),
         (
             [
                 "train",
@@ -107,41 +113,47 @@ def test_weights_verify_notices_damage(run, checkpoint, tmp_path):
             ],
             "no stage here regresses SAM's embedding; name grouping",
         ),
-        (["train", "parts", "gone"], "there is no folder gone"),
-        (["train", "parts", ".", "--run", "gone"], "there is no folder gone"),
-        (["train", "export", "gone", "-o", "w.safetensors"], "there is no folder gone"),
-        (["eval", "rooms", "gone"], "there is no folder gone"),
-        (["eval", "calibrate", "gone"], "there is no folder gone"),
-        (["eval", "sides"], "give either a furniture pack or a folder with --posed"),
-        (["eval", "sides", "p.npz", "--posed", "."], "not both"),
-        (["eval", "sides", "gone.npz"], "no furniture pack at gone.npz"),
-        (["eval", "sides", "p.npz", "--size", "224"], "leave --size out"),
-        (["eval", "sides", "p.npz", "--sheet", "a.png"], "give a furniture pack and --results"),
-        (["eval", "sides", "p.npz", "--lpips", "gone"], "no LPIPS file at gone"),
-        (["eval", "sides", "p.npz", "--lpips", TINY_PACK], "is no safetensors file"),
-        (["eval", "sides-beside", "gone", "gone"], "no result of eval sides at gone/sides.json"),
-        (["eval", "walk"], "give either a furniture pack or a folder with --posed"),
-        (["eval", "walk", "p.npz", "--posed", "."], "not both"),
-        (["eval", "walk", "gone.npz"], "no furniture pack at gone.npz"),
-        (["eval", "walk", "p.npz", "--photos", "1"], "two photos or more"),
-        (["eval", "walk", "--posed", ".", "--blur", "1"], "leave them out with --posed"),
-        (["eval", "walk", "p.npz", "--seen-aside"], "--seen-aside judges by other photos of a folder"),
-        (["eval", "walk", "p.npz", "--sheet", "a.png"], "give --results, too"),
-        (["eval", "walk", "p.npz", "-o", "table.txt"], "this command writes .md"),
-        (["eval", "walk-beside", "gone", "gone"], "no result of eval walk at gone/walk.json"),
-        (["eval", "sharp", "a.png", "--pack", "p.npz"], "give photos, a folder with --posed, or furniture"),
-        (["eval", "sharp", "gone.png", "gone.png"], "no photo at gone.png"),
-        (["eval", "sharp", TINY_PACK], "photos come in pairs, but these are 1"),
-        (["eval", "sharp", "."], "holds no photos NAME_left and NAME_right"),
-        (["eval", "sharp", "--pack", "gone.npz"], "no furniture pack at gone.npz"),
-        (["eval", "sharp", "--detail", "none"], "--detail"),
-        (["eval", "sharp", "--beside", "gone"], "there is no folder gone; make it with --keep"),
-        (["eval", "sharp", "--lpips", "gone"], "no LPIPS file at gone"),
-        (["eval", "sharp", "-o", "table.txt"], "this command writes .md"),
-        (["eval", "sharp", "--sheet", "sheet.jpg"], "this command writes .png; rename --sheet"),
-        (["eval", "walk", "p.npz", "--plot", "a.jpg"], "this command writes .png; rename --plot"),
-        (["eval", "walk", "p.npz", "--results", TINY_PACK], "is not a folder; choose another --results"),
-        (["eval", "sharp", "--weights", "gone"], "no checkpoint at gone"),
+        (["lab", "train", "parts", "gone"], "there is no folder gone"),
+        (["lab", "train", "parts", ".", "--run", "gone"], "there is no folder gone"),
+        (["lab", "train", "export", "gone", "-o", "w.safetensors"], "there is no folder gone"),
+        (["lab", "eval", "rooms", "gone"], "there is no folder gone"),
+        (["lab", "eval", "calibrate", "gone"], "there is no folder gone"),
+        (["lab", "eval", "sides"], "give either a furniture pack or a folder with --posed"),
+        (["lab", "eval", "sides", "p.npz", "--posed", "."], "not both"),
+        (["lab", "eval", "sides", "gone.npz"], "no furniture pack at gone.npz"),
+        (["lab", "eval", "sides", "p.npz", "--size", "224"], "leave --size out"),
+        (["lab", "eval", "sides", "p.npz", "--sheet", "a.png"], "give a furniture pack and --results"),
+        (["lab", "eval", "sides", "p.npz", "--lpips", "gone"], "no LPIPS file at gone"),
+        (["lab", "eval", "sides", "p.npz", "--lpips", TINY_PACK], "is no safetensors file"),
+        (["lab", "eval", "sides-beside", "gone", "gone"], "no result of eval sides at gone/sides.json"),
+        (["lab", "eval", "walk"], "give either a furniture pack or a folder with --posed"),
+        (["lab", "eval", "walk", "p.npz", "--posed", "."], "not both"),
+        (["lab", "eval", "walk", "gone.npz"], "no furniture pack at gone.npz"),
+        (["lab", "eval", "walk", "p.npz", "--photos", "1"], "two photos or more"),
+        (["lab", "eval", "walk", "--posed", ".", "--blur", "1"], "leave them out with --posed"),
+        (["lab", "eval", "walk", "p.npz", "--seen-aside"], "--seen-aside judges by other photos of a folder"),
+        (["lab", "eval", "walk", "p.npz", "--sheet", "a.png"], "give --results, too"),
+        (["lab", "eval", "walk", "p.npz", "-o", "table.txt"], "this command writes .md"),
+        (["lab", "eval", "walk-beside", "gone", "gone"], "no result of eval walk at gone/walk.json"),
+        (
+            ["lab", "eval", "sharp", "a.png", "--pack", "p.npz"],
+            "give photos, a folder with --posed, or furniture",
+        ),
+        (["lab", "eval", "sharp", "gone.png", "gone.png"], "no photo at gone.png"),
+        (["lab", "eval", "sharp", TINY_PACK], "photos come in pairs, but these are 1"),
+        (["lab", "eval", "sharp", "."], "holds no photos NAME_left and NAME_right"),
+        (["lab", "eval", "sharp", "--pack", "gone.npz"], "no furniture pack at gone.npz"),
+        (["lab", "eval", "sharp", "--detail", "none"], "--detail"),
+        (["lab", "eval", "sharp", "--beside", "gone"], "there is no folder gone; make it with --keep"),
+        (["lab", "eval", "sharp", "--lpips", "gone"], "no LPIPS file at gone"),
+        (["lab", "eval", "sharp", "-o", "table.txt"], "this command writes .md"),
+        (["lab", "eval", "sharp", "--sheet", "sheet.jpg"], "this command writes .png; rename --sheet"),
+        (["lab", "eval", "walk", "p.npz", "--plot", "a.jpg"], "this command writes .png; rename --plot"),
+        (
+            ["lab", "eval", "walk", "p.npz", "--results", TINY_PACK],
+            "is not a folder; choose another --results",
+        ),
+        (["lab", "eval", "sharp", "--weights", "gone"], "no checkpoint at gone"),
         (["weights", "verify", "gone"], "no checkpoint at gone"),
         (["weights"], "ACTION"),
     ],
@@ -156,14 +168,23 @@ def test_bad_input(run, tmp_path, monkeypatch, words, hint):
 def test_train_needs_what_a_stage_reads(run, checkpoint, tmp_path):
     (tmp_path / "cache").mkdir()
     words = ("--stages", "depth", "--minutes", "1", "--start", checkpoint)
-    outcome = run("train", "run", tmp_path / "cache", "-o", tmp_path / "run", *words)
+    outcome = run("lab", "train", "run", tmp_path / "cache", "-o", tmp_path / "run", *words)
     assert outcome.code == 2 and outcome.err.count("\n") == 1  # an empty cache
 
 
 def test_train_export_of_nothing(run, checkpoint, tmp_path):
     (tmp_path / "run").mkdir()
     card = tmp_path / "card.json"
-    words = ("train", "export", tmp_path / "run", "-o", tmp_path / "w.safetensors", "--start", checkpoint)
+    words = (
+        "lab",
+        "train",
+        "export",
+        tmp_path / "run",
+        "-o",
+        tmp_path / "w.safetensors",
+        "--start",
+        checkpoint,
+    )
     assert "no trained stage" in run(*words).err
     card.write_text("[]")
     assert "one JSON object" in run(*words, "--metadata", card).err
@@ -171,7 +192,7 @@ def test_train_export_of_nothing(run, checkpoint, tmp_path):
 
 
 def test_part_and_defaults():
-    args = build_parser().parse_args(["train", "cache", "p.npz", "-o", "out", "--part", "1/2"])
+    args = build_parser().parse_args(["lab", "train", "cache", "p.npz", "-o", "out", "--part", "1/2"])
     assert args.part == (1, 2) and args.set == "train" and args.first_seed is None
 
 
@@ -190,9 +211,9 @@ def photos(tmp_path):
 
 def test_photos_are_cached(run, checkpoint, photos, tmp_path):
     words = ("--photos", photos, "-o", tmp_path / "cache", "--start", checkpoint, "--copies", "2")
-    outcome = run("train", "cache", *words)
+    outcome = run("lab", "train", "cache", *words)
     assert outcome.code == 0 and "4 new views" in outcome.out, outcome.err
-    assert "0 new views" in run("train", "cache", *words).out
+    assert "0 new views" in run("lab", "train", "cache", *words).out
     (shard,) = (tmp_path / "cache" / "photos" / "train").iterdir()
     assert open_shards(shard.parent)[0].record(0).labels[0].name == "wall"
 
@@ -217,10 +238,10 @@ def test_the_late_half_is_trained_and_exported(run, checkpoint, photos, tmp_path
         "--start",
         checkpoint,
     )
-    outcome = run("train", "late", tmp_path / "cache", "-o", tmp_path / "run", *words)
+    outcome = run("lab", "train", "late", tmp_path / "cache", "-o", tmp_path / "run", *words)
     assert outcome.code == 0 and "2 steps" in outcome.out, outcome.err
     out = tmp_path / "w.safetensors"
-    assert run("train", "export", tmp_path / "run", "-o", out, "--start", checkpoint).code == 0
+    assert run("lab", "train", "export", tmp_path / "run", "-o", out, "--start", checkpoint).code == 0
     before, after = (load_network("mini", path).state_dict() for path in (checkpoint, out))
     moved = {key.split(".")[0] for key in before if not torch.equal(before[key], after[key])}
     assert moved == {"late", "deep", "language_head", "decoder", "depth_head"}
@@ -233,7 +254,7 @@ def test_the_late_half_goes_on_with_other_photos(run, checkpoint, photos, tmp_pa
             content = next((photos / folder).glob("1.*"))
             (photos / folder / f"{number}{content.suffix}").write_bytes(content.read_bytes())
     write_shard(tmp_path / "cache" / "train" / "a.safetensors", [toy_record(0)])
-    assert run("train", "photos", "plain", photos / "images", "-o", tmp_path / "plain").code == 0
+    assert run("lab", "train", "photos", "plain", photos / "images", "-o", tmp_path / "plain").code == 0
     words = (
         "--photos",
         photos,
@@ -247,30 +268,30 @@ def test_the_late_half_goes_on_with_other_photos(run, checkpoint, photos, tmp_pa
         "2",
     )
     where = ("-o", tmp_path / "run", "--start", checkpoint)
-    outcome = run("train", "late", tmp_path / "cache", *words, *where)
+    outcome = run("lab", "train", "late", tmp_path / "cache", *words, *where)
     assert outcome.code == 0 and "1 steps" in outcome.out, outcome.err
     assert {path.name for path in (tmp_path / "run").glob("*.pt")} == {"late.pt", "late_few.pt"}
     where = ("-o", tmp_path / "twice", "--start", checkpoint)
-    assert run("train", "late", tmp_path / "cache", *words, *where, "--twice").code == 0
+    assert run("lab", "train", "late", tmp_path / "cache", *words, *where, "--twice").code == 0
     assert {path.name for path in (tmp_path / "twice").glob("*.pt")} == {"late.pt", "late_twice.pt"}
     words = ("--photos", photos, "--more", tmp_path / "gone", "--minutes", "5")
-    assert "gone/images" in run("train", "late", tmp_path / "cache", *words, *where).err
+    assert "gone/images" in run("lab", "train", "late", tmp_path / "cache", *words, *where).err
 
 
 def test_the_second_network_is_learned_to_be_read(run, checkpoint, photos, tmp_path):
     """Two steps on six photos and a room; the layer that reads it moves, and nothing else."""
     write_shard(tmp_path / "cache" / "train" / "a.safetensors", [toy_record(0)])
     few = ("--photos", photos, "-o", tmp_path / "few", "--minutes", "1", "--start", checkpoint)
-    assert "no name that 5 of them show" in run("train", "second", tmp_path / "cache", *few).err
+    assert "no name that 5 of them show" in run("lab", "train", "second", tmp_path / "cache", *few).err
     for number in range(3, 7):
         for folder in ("images", "labels"):
             content = next((photos / folder).glob("1.*"))
             (photos / folder / f"{number}{content.suffix}").write_bytes(content.read_bytes())
     words = ("--photos", photos, "-o", tmp_path / "run", "--minutes", "5", "--max-steps", "2")
-    outcome = run("train", "second", tmp_path / "cache", *words, "--start", checkpoint)
+    outcome = run("lab", "train", "second", tmp_path / "cache", *words, "--start", checkpoint)
     assert outcome.code == 0 and "2 steps" in outcome.out, outcome.err
     out = tmp_path / "w.safetensors"
-    assert run("train", "export", tmp_path / "run", "-o", out, "--start", checkpoint).code == 0
+    assert run("lab", "train", "export", tmp_path / "run", "-o", out, "--start", checkpoint).code == 0
     before, after = (load_network("mini", path).state_dict() for path in (checkpoint, out))
     moved = {key.split(".")[0] for key in before if not torch.equal(before[key], after[key])}
     assert moved == {"second_head"}
@@ -278,7 +299,9 @@ def test_the_second_network_is_learned_to_be_read(run, checkpoint, photos, tmp_p
     for value in blind.deeplab.parameters():
         torch.nn.init.zeros_(value)
     save_network(blind, tmp_path / "blind.safetensors")
-    refused = run("train", "second", tmp_path / "cache", *words, "--start", tmp_path / "blind.safetensors")
+    refused = run(
+        "lab", "train", "second", tmp_path / "cache", *words, "--start", tmp_path / "blind.safetensors"
+    )
     assert refused.code == 2 and "holds no second network; give one with --weights" in refused.err
 
 
@@ -289,26 +312,28 @@ def test_the_grouping_learns_from_named_and_outlined_photos(run, checkpoint, pho
     save_file(mobile_sam_file(MobileSam(128).eval()), tmp_path / "sam.safetensors")
     out = tmp_path / "outlined"
     words = ("--weights", tmp_path / "sam.safetensors", "--side", "128", "--grid", "2")
-    outcome = run("train", "outlines", photos, "-o", out, *words)
+    outcome = run("lab", "train", "outlines", photos, "-o", out, *words)
     assert outcome.code == 0 and "2 photos outlined" in outcome.out, outcome.err
     assert np.asarray(Image.open(out / "labels" / "1.png")).shape == (42, 56)
     write_shard(tmp_path / "cache" / "train" / "a.safetensors", [toy_record(0)])
     words = ("--stages", "grouping", "--minutes", "5", "--max-steps", "1", "--start", checkpoint)
     where = (tmp_path / "cache", "-o", tmp_path / "run", "--outlined", photos, out, "--workers", "1")
-    outcome = run("train", "run", *where, *words, "--pictures", "4", "--rate", "1e-4")
+    outcome = run("lab", "train", "run", *where, *words, "--pictures", "4", "--rate", "1e-4")
     assert outcome.code == 0 and "trained grouping" in outcome.out, outcome.err
     (row,) = [json.loads(line) for line in (tmp_path / "run" / "grouping.jsonl").read_text().splitlines()][:1]
     assert "photos_contrast" in row and row["rate"] <= 1e-4
-    outcome = run("eval", "grouping", photos, "--weights", checkpoint, "--limit", "1", "--json")
+    outcome = run("lab", "eval", "grouping", photos, "--weights", checkpoint, "--limit", "1", "--json")
     assert outcome.code == 0 and 0 < outcome.json()["parts"]["achievable"] <= 1, outcome.err
-    assert "| F1 of borders, 4 pixels |" in run("eval", "grouping", photos, "--weights", checkpoint).out
+    assert (
+        "| F1 of borders, 4 pixels |" in run("lab", "eval", "grouping", photos, "--weights", checkpoint).out
+    )
 
 
 def test_a_data_set_is_converted(run, tmp_path):
     (tmp_path / "seq").mkdir()
     Image.new("RGB", (56, 42)).save(tmp_path / "seq" / "frame-000000.color.png")
     np.savetxt(tmp_path / "seq" / "frame-000000.pose.txt", np.eye(4))
-    outcome = run("train", "photos", "frames", tmp_path / "seq", "-o", tmp_path / "out")
+    outcome = run("lab", "train", "photos", "frames", tmp_path / "seq", "-o", tmp_path / "out")
     assert outcome.code == 0 and outcome.out == f"{tmp_path / 'out'}: 1 photos\n", outcome.err
     assert tuple(layouts.LAYOUTS) == LAYOUTS
 
@@ -316,7 +341,7 @@ def test_a_data_set_is_converted(run, tmp_path):
 def test_labelled_photos_are_judged(run, checkpoint, photos, tmp_path):
     table = tmp_path / "new" / "table.md"
     words = ("--weights", checkpoint, "--limit", "1", "--size", "56", "--backend", "torch", "-o", table)
-    outcome = run("eval", "photos-labelled", photos, *words, "--json")
+    outcome = run("lab", "eval", "photos-labelled", photos, *words, "--json")
     assert outcome.code == 0, outcome.err
     document = outcome.json()
     assert document["photos"] == 1 and document["numbers"] == ["2", "2"]
@@ -333,7 +358,7 @@ def test_posed_photos_are_judged(run, checkpoint, tmp_path):
         writer.pose(id, torch.eye(4, dtype=torch.float64))
     writer.finish({}, "drawn by a test")
     words = ("--weights", checkpoint, "--size", "56", "--backend", "torch", "--apart", "6")
-    outcome = run("eval", "posed", tmp_path / "posed", *words)
+    outcome = run("lab", "eval", "posed", tmp_path / "posed", *words)
     assert outcome.code == 0, outcome.err
     assert "(no motion)" in outcome.out and "| 6 | 1.000 | 0.000 | 0.000 | 0.000 | 180.000 |" in outcome.out
     assert "Depth" not in outcome.out
@@ -345,32 +370,34 @@ def test_rooms_are_judged_and_shown_from_aside(run, checkpoint, tmp_path, monkey
     monkeypatch.setattr("app.cli.lab.sheets.sides.PAIRS", ("toy",))
     sheet, kept = tmp_path / "new" / "sheet.png", tmp_path / "kept"
     words = ("--weights", checkpoint, "--limit", "1", "--results", kept, "--sheet", sheet)
-    outcome = run("eval", "sides", TINY_PACK, *words)
+    outcome = run("lab", "eval", "sides", TINY_PACK, *words)
     assert outcome.code == 0, outcome.err
     assert "| the photos' own places | 1 |" in outcome.out
     assert np.asarray(Image.open(sheet)).std() > 10
     assert len(list((kept / "pictures").iterdir())) == 4 + 4 + 4  # a room, its truth, a pair
     both = tmp_path / "both.png"
-    assert run("eval", "sides-beside", kept, kept, "--sheet", both).code == 0
+    assert run("lab", "eval", "sides-beside", kept, kept, "--sheet", both).code == 0
     assert np.asarray(Image.open(both)).shape[1] > np.asarray(Image.open(sheet)).shape[1]
 
 
 def test_posed_photos_are_judged_from_aside(run, checkpoint, tmp_path):
     posed = write_folder(tmp_path / "posed", 7).root
     words = ("--weights", checkpoint, "--size", "56", "--backend", "torch", "--apart", "6")
-    outcome = run("eval", "sides", "--posed", posed, *words, "--results", tmp_path / "now", "--json")
+    outcome = run("lab", "eval", "sides", "--posed", posed, *words, "--results", tmp_path / "now", "--json")
     assert outcome.code == 0, outcome.err
     (row,) = outcome.json()["cases"]
     assert row["name"] == "001-007" and {"001", "004"} <= row["looks"].keys()
     table = tmp_path / "new" / "table.md"
-    beside = run("eval", "sides-beside", tmp_path / "now", tmp_path / "now", "-o", table)
+    beside = run("lab", "eval", "sides-beside", tmp_path / "now", tmp_path / "now", "-o", table)
     assert beside.code == 0 and beside.out == table.read_text()
     assert "| between the photos: PSNR, holes black (dB) |" in beside.out and "+0.000 ± 0.000" in beside.out
-    without = run("eval", "sides-beside", tmp_path / "now", tmp_path / "now", "--sheet", tmp_path / "a.png")
+    without = run(
+        "lab", "eval", "sides-beside", tmp_path / "now", tmp_path / "now", "--sheet", tmp_path / "a.png"
+    )
     assert without.code == 2 and "holds no pictures" in without.err
     for depths in (posed / "depths").iterdir():
         depths.unlink()
-    assert "has no depth in metres" in run("eval", "sides", "--posed", posed, *words).err
+    assert "has no depth in metres" in run("lab", "eval", "sides", "--posed", posed, *words).err
 
 
 def test_a_walk_is_judged_kept_and_judged_beside_itself(run, checkpoint, tmp_path):
@@ -389,7 +416,7 @@ def test_a_walk_is_judged_kept_and_judged_beside_itself(run, checkpoint, tmp_pat
         "--limit",
         "1",
     )
-    words = ("eval", "walk", "--posed", posed, *words, "--results", kept)
+    words = ("lab", "eval", "walk", "--posed", posed, *words, "--results", kept)
     outcome = run(*words, "--sheet", sheet, "--json")
     assert outcome.code == 0, outcome.err
     document = outcome.json()
@@ -409,7 +436,7 @@ def test_a_walk_is_judged_kept_and_judged_beside_itself(run, checkpoint, tmp_pat
         photo.write_bytes(b"")
     assert "| PSNR between, whole (dB) |" in run(*words).out
     table, both = tmp_path / "new" / "table.md", tmp_path / "both.png"
-    beside = run("eval", "walk-beside", kept, kept, "-o", table, "--sheet", both)
+    beside = run("lab", "eval", "walk-beside", kept, kept, "-o", table, "--sheet", both)
     assert beside.code == 0 and beside.out == table.read_text()
     assert "| 3 photos: PSNR between, whole (dB) |" in beside.out and "+0.00 ± 0.00" in beside.out
     assert np.asarray(Image.open(both)).shape[1] > np.asarray(Image.open(sheet)).shape[1]
@@ -418,25 +445,40 @@ def test_a_walk_is_judged_kept_and_judged_beside_itself(run, checkpoint, tmp_pat
 @pytest.mark.parametrize(
     ("words", "hint"),
     [
-        (["eval", "sides", "--posed", "PHOTOS"], "has no poses.txt"),
-        (["eval", "walk", "--posed", "PHOTOS"], "has no poses.txt"),
-        (["eval", "sharp", "--posed", "PHOTOS"], "has no poses.txt"),
-        (["eval", "photos-labelled", "gone"], "there is no folder gone/images"),
-        (["eval", "photos-labelled", "PHOTOS", "--only", "7-9"], "none of the 2 photos is chosen"),
-        (["eval", "photos-labelled", "PHOTOS", "--part", "validation"], "choose another --part or --only"),
-        (["eval", "photos-labelled", "PHOTOS", "--only", "9-7"], "--only"),
-        (["eval", "photos-labelled", "PHOTOS", "--crop", "9,9,3,3"], "--crop"),
-        (["eval", "photos-labelled", "PHOTOS", "--crop", "0,0,99,9"], "does not fit into photo 1"),
-        (["eval", "photos-labelled", "PHOTOS", "-o", "table.txt"], "this command writes .md"),
-        (["eval", "posed", "PHOTOS"], "has no poses.txt"),
-        (["eval", "calibrate", ".", "--plot", "plot.jpg"], "this command writes .png; rename --plot"),
-        (["train", "cache", "-o", "out"], "either a furniture pack or a folder with --photos"),
-        (["train", "cache", "p.npz", "--photos", "PHOTOS", "-o", "out"], "not both"),
-        (["train", "cache", "--photos", "PHOTOS", "-o", "out", "--set", "held_out"], "no held-out set"),
-        (["train", "late", "gone", "--photos", "PHOTOS", "-o", "out", "--minutes", "1"], "no folder gone"),
-        (["train", "late", ".", "--photos", "gone", "-o", "out", "--minutes", "1"], "no folder gone/images"),
-        (["train", "late", ".", "-o", "out", "--minutes", "1"], "--photos"),
-        (["train", "second", "gone", "--photos", "PHOTOS", "-o", "out", "--minutes", "1"], "no folder gone"),
+        (["lab", "eval", "sides", "--posed", "PHOTOS"], "has no poses.txt"),
+        (["lab", "eval", "walk", "--posed", "PHOTOS"], "has no poses.txt"),
+        (["lab", "eval", "sharp", "--posed", "PHOTOS"], "has no poses.txt"),
+        (["lab", "eval", "photos-labelled", "gone"], "there is no folder gone/images"),
+        (["lab", "eval", "photos-labelled", "PHOTOS", "--only", "7-9"], "none of the 2 photos is chosen"),
+        (
+            ["lab", "eval", "photos-labelled", "PHOTOS", "--part", "validation"],
+            "choose another --part or --only",
+        ),
+        (["lab", "eval", "photos-labelled", "PHOTOS", "--only", "9-7"], "--only"),
+        (["lab", "eval", "photos-labelled", "PHOTOS", "--crop", "9,9,3,3"], "--crop"),
+        (["lab", "eval", "photos-labelled", "PHOTOS", "--crop", "0,0,99,9"], "does not fit into photo 1"),
+        (["lab", "eval", "photos-labelled", "PHOTOS", "-o", "table.txt"], "this command writes .md"),
+        (["lab", "eval", "posed", "PHOTOS"], "has no poses.txt"),
+        (["lab", "eval", "calibrate", ".", "--plot", "plot.jpg"], "this command writes .png; rename --plot"),
+        (["lab", "train", "cache", "-o", "out"], "either a furniture pack or a folder with --photos"),
+        (["lab", "train", "cache", "p.npz", "--photos", "PHOTOS", "-o", "out"], "not both"),
+        (
+            ["lab", "train", "cache", "--photos", "PHOTOS", "-o", "out", "--set", "held_out"],
+            "no held-out set",
+        ),
+        (
+            ["lab", "train", "late", "gone", "--photos", "PHOTOS", "-o", "out", "--minutes", "1"],
+            "no folder gone",
+        ),
+        (
+            ["lab", "train", "late", ".", "--photos", "gone", "-o", "out", "--minutes", "1"],
+            "no folder gone/images",
+        ),
+        (["lab", "train", "late", ".", "-o", "out", "--minutes", "1"], "--photos"),
+        (
+            ["lab", "train", "second", "gone", "--photos", "PHOTOS", "-o", "out", "--minutes", "1"],
+            "no folder gone",
+        ),
         (
             [
                 "train",
@@ -454,24 +496,43 @@ def test_a_walk_is_judged_kept_and_judged_beside_itself(run, checkpoint, tmp_pat
             "gone.tflite",
         ),
         (
-            ["train", "late", ".", "--photos", "PHOTOS", "-o", "out", "--minutes", "1"],
-            "langflash train cache",
+            ["lab", "train", "late", ".", "--photos", "PHOTOS", "-o", "out", "--minutes", "1"],
+            "langflash lab train cache",
         ),
         (
-            ["train", "late", ".", "--photos", "PHOTOS", "-o", "out", "--minutes", "1", "--twice"],
+            ["lab", "train", "late", ".", "--photos", "PHOTOS", "-o", "out", "--minutes", "1", "--twice"],
             "name some with --more",
         ),
-        (["train", "photos", "nyu", "gone", "-o", "out"], "there is no gone"),
-        (["train", "outlines", "PHOTOS", "-o", "out", "--weights", "gone.pt"], "no checkpoint of MobileSAM"),
-        (["train", "outlines", "PHOTOS", "-o", "out"], "--weights"),
-        (["eval", "grouping", "gone"], "there is no folder gone/images"),
-        (["train", "run", ".", "-o", "o", "--scenes", ".", "--outlined", "PHOTOS"], "leave out --outlined"),
+        (["lab", "train", "photos", "nyu", "gone", "-o", "out"], "there is no gone"),
         (
-            ["train", "run", ".", "-o", "o", "--stages", "depth", "--minutes", "1", "--outlined", "PHOTOS"],
+            ["lab", "train", "outlines", "PHOTOS", "-o", "out", "--weights", "gone.pt"],
+            "no checkpoint of MobileSAM",
+        ),
+        (["lab", "train", "outlines", "PHOTOS", "-o", "out"], "--weights"),
+        (["lab", "eval", "grouping", "gone"], "there is no folder gone/images"),
+        (
+            ["lab", "train", "run", ".", "-o", "o", "--scenes", ".", "--outlined", "PHOTOS"],
+            "leave out --outlined",
+        ),
+        (
+            [
+                "lab",
+                "train",
+                "run",
+                ".",
+                "-o",
+                "o",
+                "--stages",
+                "depth",
+                "--minutes",
+                "1",
+                "--outlined",
+                "PHOTOS",
+            ],
             "no stage here learns from outlined photos",
         ),
-        (["train", "run", ".", "-o", "o", "--recipe", "paper", "--rate", "1"], "what --rate is"),
-        (["train", "photos", "voc", "gone", "-o", "out"], "invalid choice"),
+        (["lab", "train", "run", ".", "-o", "o", "--recipe", "paper", "--rate", "1"], "what --rate is"),
+        (["lab", "train", "photos", "voc", "gone", "-o", "out"], "invalid choice"),
     ],
 )
 def test_bad_photos(run, photos, tmp_path, monkeypatch, words, hint):
@@ -498,7 +559,7 @@ def test_rooms_and_photos_are_calibrated_together(run, checkpoint, tmp_path):
     write_shard(tmp_path / "cache" / "validation" / "a.safetensors", rooms)
     plot = tmp_path / "new" / "diagram.png"
     words = ("--weights", checkpoint, "--photos", tmp_path / "photos", "--backend", "torch", "--plot", plot)
-    outcome = run("eval", "calibrate", tmp_path / "cache", *words)
+    outcome = run("lab", "eval", "calibrate", tmp_path / "cache", *words)
     assert outcome.code == 0, outcome.err
     found = outcome.json()["calibration"]
     assert 0 < found["threshold"] < 1 and set(found["validation"]) == {"rooms", "photos"}

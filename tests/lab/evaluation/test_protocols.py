@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import torch
 
-from app.cli.words.judging import EVAL_PROTOCOLS
+from app.cli.lab.words.judging import EVAL_PROTOCOLS
 from langflash_core.errors import InputError
 from langflash_core.lab.evaluation import posed
 from langflash_core.lab.evaluation.case_tables import cases_markdown

@@ -1,4 +1,4 @@
-"""`langflash eval real`: which frames are photos, which are held back, and the table of what was found."""
+"""`lab eval real`: which frames are photos, which are held back, and the table of what was found."""
 
 from pathlib import Path
 

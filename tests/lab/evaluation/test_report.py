@@ -85,7 +85,7 @@ def test_the_page_needs_nothing_from_elsewhere_and_escapes_what_it_says(folder, 
     found = made(folder, tmp_path)
     hostile = Table("", ("system",), (("<script>alert(1)</script>",),))
     report = report_page.Report(
-        found, hostile, "langflash eval report -o 'a & b'", {"cpus": 2}, "mini (abc)", "2026-11-22"
+        found, hostile, "langflash lab eval report -o 'a & b'", {"cpus": 2}, "mini (abc)", "2026-11-22"
     )
     page = report_page.html(report)
     assert "<script" not in page and "a &amp; b" in page

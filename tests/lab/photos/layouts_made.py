@@ -146,7 +146,7 @@ VECTOR = 512  # channels of a collected thing's vector
 
 
 def collect(folder: PhotoFolder, chunk: Path, keys: tuple[str, ...], offset: int = 0) -> None:
-    """Put labels into videos of a chunk, as `langflash labels` does: an id map a frame, a vector a thing."""
+    """Put labels into videos of a chunk, as `lab labels` does: an id map a frame, a vector a thing."""
     entries = torch.load(chunk, weights_only=True)
     maps = []
     for id in folder.ids:

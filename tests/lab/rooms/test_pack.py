@@ -97,7 +97,7 @@ def test_foreign_and_missing_packs_are_refused(library: Path, tmp_path: Path) ->
     half.write_bytes(data[: len(data) // 2])
     spoilt.write_bytes(data[: len(data) // 2] + bytes(64) + data[len(data) // 2 + 64 :])
     for path in (bad, half, spoilt, tmp_path / "none.npz"):
-        with pytest.raises(InputError, match="langflash rooms pack"):
+        with pytest.raises(InputError, match="langflash lab rooms pack"):
             load_pack(path)
 
 

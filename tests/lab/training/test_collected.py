@@ -1,4 +1,4 @@
-"""What `langflash labels` collects of a clip comes back as things to learn from, numbers and vectors."""
+"""What `langflash lab labels` collects of a clip comes back as things to learn from, numbers and vectors."""
 
 import json
 from pathlib import Path
@@ -103,7 +103,7 @@ def test_from_a_folder_of_posed_clips(tmp_path):
 
 def test_clips_without_poses_or_labels_are_refused_in_a_sentence(tmp_path):
     posed_clip(tmp_path / "clips" / "hall", poses=False)
-    with pytest.raises(InputError, match="collect them with langflash labels"):
+    with pytest.raises(InputError, match="collect them with langflash lab labels"):
         source_at(tmp_path / "clips", tmp_path / "out")
     (place,) = find_clips(tmp_path / "clips")
     collected(place, tmp_path / "out")

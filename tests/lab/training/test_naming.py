@@ -76,7 +76,7 @@ def test_finished_files_are_left_alone(parts, rooms, network, tmp_path: Path):
     before = path.stat().st_mtime_ns
     assert run_parts(network().eval(), rooms.folder, tmp_path / "parts") == 0
     assert path.stat().st_mtime_ns == before
-    with pytest.raises(ValueError, match="langflash train parts"):
+    with pytest.raises(ValueError, match="langflash lab train parts"):
         PartSet(tmp_path / "nowhere")
 
 

@@ -123,7 +123,7 @@ def test_labelled_videos_of_chunks_are_read_with_their_vectors(labelled):
 def test_videos_without_labels_are_refused_in_one_sentence(wall, tmp_path):
     layouts_made.re10k_split(wall, tmp_path)
     source = re10k_source(tmp_path / "test")
-    with pytest.raises(InputError, match="collect them with langflash labels"):
+    with pytest.raises(InputError, match="collect them with langflash lab labels"):
         SceneSet(source, SMALL).draw(1, 2, torch.Generator().manual_seed(0))
 
 

@@ -1,1 +1,1 @@
-"""What `langflash eval` does, a module an action."""
+"""What `langflash lab eval` does, a module an action."""

@@ -1,4 +1,4 @@
-"""`langflash eval ablations`: which part of the method pays, and what its rivals cost."""
+"""`langflash lab eval ablations`: which part of the method pays, and what its rivals cost."""
 
 from argparse import Namespace
 from typing import TextIO
@@ -16,7 +16,7 @@ def ablations(args: Namespace, out: TextIO) -> None:
         LangFlashError: cache, checkpoint or output cannot be used.
     """
     if not args.cache.is_dir():
-        raise InputError(f"there is no folder {args.cache}; make it with langflash train cache")
+        raise InputError(f"there is no folder {args.cache}; make it with langflash lab train cache")
     if args.output is not None:
         check_output_file(args.output, (".md",))
     if args.work is not None:

@@ -1,4 +1,4 @@
-"""`langflash eval labels`: collected labels against the truth of rendered rooms."""
+"""`langflash lab eval labels`: collected labels against the truth of rendered rooms."""
 
 from argparse import Namespace
 from typing import TextIO

@@ -1,4 +1,4 @@
-"""`langflash eval level`: how scenes stand, how large they are, what inventory and plan get right."""
+"""`langflash lab eval level`: how scenes stand, how large they are, what inventory and plan get right."""
 
 from argparse import Namespace
 from typing import TextIO

@@ -1,4 +1,4 @@
-"""`langflash eval moved`: what is found of things that were moved between two scenes of a room."""
+"""`langflash lab eval moved`: what is found of things that were moved between two scenes of a room."""
 
 from argparse import Namespace
 from typing import TextIO

@@ -1,4 +1,4 @@
-"""`langflash eval protocol`: a published data set, judged as papers judge it."""
+"""`langflash lab eval protocol`: a published data set, judged as papers judge it."""
 
 from argparse import Namespace
 from collections.abc import Iterator

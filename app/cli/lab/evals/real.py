@@ -1,4 +1,4 @@
-"""`langflash eval real`: frames of a real place, or a film, beside what is drawn of them."""
+"""`langflash lab eval real`: frames of a real place, or a film, beside what is drawn of them."""
 
 import io
 from argparse import Namespace

@@ -1,4 +1,4 @@
-"""`langflash eval report`: everything that is at hand, judged and put on one page."""
+"""`langflash lab eval report`: everything that is at hand, judged and put on one page."""
 
 import shlex
 import sys
@@ -50,7 +50,7 @@ def report(args: Namespace, out: TextIO) -> None:
     if args.scene is not None:
         readable_file(args.scene, "scene", SceneFileError)
     if args.rooms is not None and not args.rooms.is_dir():
-        raise InputError(f"there is no folder {args.rooms}; make it with langflash train cache")
+        raise InputError(f"there is no folder {args.rooms}; make it with langflash lab train cache")
     judges = plans(_sources(args))
     if not judges and args.scene is None:
         raise InputError("there is nothing to judge; give --rooms, --pack, --posed, --photos or --scene")

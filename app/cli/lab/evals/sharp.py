@@ -1,4 +1,4 @@
-"""`langflash eval sharp`: how near pictures of scenes are to their photos, at the photos' size."""
+"""`langflash lab eval sharp`: how near pictures of scenes are to their photos, at the photos' size."""
 
 import json
 from argparse import Namespace

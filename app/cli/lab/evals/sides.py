@@ -1,4 +1,4 @@
-"""`langflash eval sides` and `sides-beside`: scenes seen from aside, by one version of the code or by two."""
+"""`lab eval sides` and `sides-beside`: scenes seen from aside, by one version of the code or by two."""
 
 from argparse import Namespace
 from collections.abc import Callable, Iterator

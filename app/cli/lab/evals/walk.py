@@ -1,4 +1,4 @@
-"""`langflash eval walk` and `walk-beside`: the same place in 2, 4, 8 ... photos, by one version or by two."""
+"""`lab eval walk` and `walk-beside`: the same place in 2, 4, 8 ... photos, by one version or by two."""
 
 from argparse import Namespace
 from collections.abc import Iterator

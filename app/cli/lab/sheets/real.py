@@ -1,4 +1,4 @@
-"""A sheet of `langflash eval real`: a column a frame, its photo, what the scene and fewer photos show."""
+"""A sheet of `langflash lab eval real`: a column a frame, its photo, what the scene and fewer photos show."""
 
 import numpy as np
 from PIL import Image

@@ -1,4 +1,4 @@
-"""A sheet of `langflash eval sharp`: photo, scenes and the photo through the grid, whole and from near."""
+"""A sheet of `lab eval sharp`: photo, scenes and the photo through the grid, whole and from near."""
 
 from collections.abc import Mapping
 

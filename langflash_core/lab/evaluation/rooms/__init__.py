@@ -1,1 +1,1 @@
-"""`langflash eval rooms`: the network on rooms with furniture it has never seen."""
+"""`langflash lab eval rooms`: the network on rooms with furniture it has never seen."""

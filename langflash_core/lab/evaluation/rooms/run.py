@@ -1,4 +1,4 @@
-"""`langflash eval rooms`: the network on rooms with furniture it has never seen, in one command.
+"""`langflash lab eval rooms`: the network on rooms with furniture it has never seen, in one command.
 
 Every scene gives two photos to the network and keeps a third as the target view. Depth, pose and
 points are judged in the photos, pictures and labels in the photos and in the target view (there
@@ -36,7 +36,7 @@ log = logging.getLogger(__name__)
 def run_eval(
     data: Path, weights: Path | None = None, *, preset: str = "mini", limit: int | None = None
 ) -> dict:
-    """Judge a checkpoint on `data/held_out` (made by `langflash train cache --set held_out`).
+    """Judge a checkpoint on `data/held_out` (made by `langflash lab train cache --set held_out`).
 
     Args:
         data: cache folder; `held_out` is judged, `validation` calibrates the presence threshold

@@ -54,7 +54,7 @@ def collected_texts(vectors: Tensor, found: "NamedParts", space: str) -> GroupTe
     if vectors.shape[1] != channels:
         raise InputError(
             f"collected vectors have {vectors.shape[1]} numbers, those of the network {channels}; collect "
-            f"them again, with langflash labels --vectors {space}"
+            f"them again, with langflash lab labels --vectors {space}"
         )
     return GroupTexts(vectors[found.instances], vectors)
 

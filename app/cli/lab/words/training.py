@@ -5,8 +5,8 @@ from pathlib import Path
 
 from langflash_core.network.presets import PRECISIONS
 
-from ..values import above_zero, minutes, part, seed, share, size, whole_count
-from .shared import add_description, add_json, add_output, new_actions, new_command
+from ...values import above_zero, minutes, part, seed, share, size, whole_count
+from ...words.shared import add_description, add_json, add_output, new_actions, new_command
 
 # langflash_core.lab.photos.layouts.LAYOUTS, which would bring torch along.
 LAYOUTS = (
@@ -15,7 +15,7 @@ LAYOUTS = (
 
 
 def add_rooms(commands) -> None:
-    """`langflash rooms`."""
+    """`langflash lab rooms`."""
     actions = new_actions(commands, "rooms", "make furnished rooms for training and tests")
     pack = new_command(actions, "pack", "furniture libraries (.sh3f) to one pack")
     pack.add_argument("folder", type=Path, metavar="FOLDER")
@@ -41,7 +41,7 @@ def _add_seeds(command: argparse.ArgumentParser, *, count: int) -> None:
 
 
 def add_labels(commands) -> None:
-    """`langflash labels`."""
+    """`langflash lab labels`."""
     command = new_command(
         commands,
         "labels",
@@ -81,7 +81,7 @@ def add_labels(commands) -> None:
 
 
 def add_label_models(command: argparse.ArgumentParser) -> None:
-    """What `langflash labels` makes labels with."""
+    """What `langflash lab labels` makes labels with."""
     command.add_argument(
         "--masks",
         choices=("network", "mobile-sam", "sam2"),
@@ -117,7 +117,7 @@ def add_label_models(command: argparse.ArgumentParser) -> None:
 
 
 def add_train(commands) -> None:
-    """`langflash train`."""
+    """`langflash lab train`."""
     actions = new_actions(commands, "train", "train the network on rendered rooms")
     adopt = new_command(actions, "adopt", "published weights of the frozen parts to a file to start from")
     adopt.add_argument("encoder", type=Path, metavar="ENCODER", help="timm state dict, .safetensors")
@@ -201,7 +201,10 @@ def _add_stages(actions) -> None:
         "chunks of RealEstate10K, or posed clips with --labels, instead of cached rooms",
     )
     run.add_argument(
-        "--labels", type=Path, metavar="OUT", help="of --scenes: what langflash labels wrote of these clips"
+        "--labels",
+        type=Path,
+        metavar="OUT",
+        help="of --scenes: what langflash lab labels wrote of these clips",
     )
     run.add_argument(
         "--outlined",
