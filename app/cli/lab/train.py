@@ -149,16 +149,10 @@ def _parts(args: Namespace, out: TextIO) -> None:
 
 def _late(args: Namespace, out: TextIO) -> None:
     folder = _labelled(args)
-    if args.twice and not args.more:
-        raise InputError(
-            "--twice teaches with other sets of photos beside the labelled ones; name some with --more"
-        )
-    if args.names and (args.twice or not args.more):
-        raise InputError(
-            "--names goes with --more and without --twice; name other sets of photos with --more"
-        )
+    if args.names and not args.more:
+        raise InputError("--names goes with --more; name other sets of photos with it")
     with joined(args.device) as device:
-        state = run_late(_learned_from(args, folder, device), twice=args.twice, names=args.names)
+        state = run_late(_learned_from(args, folder, device), names=args.names)
         if leads():
             print(f"{args.output}: trained the late halves, {state.step} steps", file=out)
 

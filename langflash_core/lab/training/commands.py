@@ -28,7 +28,7 @@ from langflash_core.lab.training.cache import (
 from langflash_core.lab.training.dense import DenseSet
 from langflash_core.lab.training.fewlabels import NAMES_ALONE
 from langflash_core.lab.training.frozen import FrozenSet
-from langflash_core.lab.training.further import Sets, judge_of, train_few, train_second, train_twice
+from langflash_core.lab.training.further import Sets, judge_of, train_few, train_second
 from langflash_core.lab.training.live import LivePhotos
 from langflash_core.lab.training.loop import LoopOptions, Validate, train_stage
 from langflash_core.lab.training.mixing import MixedSet
@@ -229,14 +229,13 @@ class PhotoRun:
         return phrase_table(self.cache, self.encode)
 
 
-def run_late(given: PhotoRun, *, twice: bool = False, names: bool = False) -> LoopState:
+def run_late(given: PhotoRun, *, names: bool = False) -> LoopState:
     """Train the late halves, and the heads that read them, on labelled photos and the cached rooms.
 
     With other sets the late halves go on from what the weights have instead of beginning anew (`fewlabels`).
 
     Args:
-        twice: what the weights say of mirrored and larger photos teaches them (`twice`), instead of their
-            average. names: nothing is learned of depth.
+        names: nothing is learned of depth.
 
     Raises:
         InputError: no cache, or a photo cannot be used.
@@ -246,8 +245,6 @@ def run_late(given: PhotoRun, *, twice: bool = False, names: bool = False) -> Lo
     if given.more:
         judge = judge_of(photos, kept, encode, options.device) if kept else None
         rooms.tokens = False  # of the frozen half alone, which is run with the others
-        if twice:
-            return train_twice(network, given.sets(), rooms, table, given.run_dir, options, judge)
         weights = NAMES_ALONE if names else None
         return train_few(network, given.sets(), rooms, table, given.run_dir, options, judge, weights)
     live = LivePhotos(photos, given.ids)

@@ -1,5 +1,5 @@
-"""Going on from taught weights, with other sets of photos beside the labelled ones: `train late --more`,
-`--twice`, and `train second`."""
+"""Going on from taught weights, with other sets of photos beside the labelled ones: `train late --more`
+and `train second`."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -9,7 +9,6 @@ import torch
 from torch import Tensor
 
 from langflash_core.lab.photos import PhotoFolder, chosen_ids
-from langflash_core.lab.training import twice
 from langflash_core.lab.training.bank import NameBank
 from langflash_core.lab.training.batches import RoomSet
 from langflash_core.lab.training.fewlabels import Averaged, FewSet, Weights, few_stage
@@ -30,10 +29,8 @@ MAIN_SHARE = 0.65
 LEARNED = 0.5
 """Of the way from the weights that a run begins with to those it ends with (model card); all of it
 where another network is heard, since nothing is lost then (MEASURED.md)."""
-EMA_DECAY, TWICE_DECAY = 0.995, 0.99
+EMA_DECAY = 0.995
 """Of the averaged weights that a run ends with."""
-TWICE_SHARES = (0.32, 0.12, 0.56)
-"""Of a step's photos where all sets teach together: the judged set, other labelled ones, the rest."""
 WARM_UP = 20
 
 
@@ -80,17 +77,6 @@ class Sets:
         sets, numbers = zip(*named, strict=True)
         return PhotoPool(sets, numbers, self.told.bank)
 
-    def together(self) -> PhotoPool:
-        """All of them as one, with their larger pictures."""
-        first, *told = self.told.sets
-        silent = () if self.silent is None else self.silent.sets
-        numbers = self.told.numbers + (() if self.silent is None else self.silent.numbers)
-        shared = [replace(first, share=TWICE_SHARES[0])]
-        for sets, share in zip((told, silent), TWICE_SHARES[1:], strict=True):
-            whole = sum(one.share for one in sets)
-            shared += [replace(one, share=share * one.share / whole) for one in sets]
-        return PhotoPool(tuple(shared), numbers, self.told.bank, larger=True)
-
 
 def train_few(
     network: LangFlashNet,
@@ -112,7 +98,7 @@ def train_few(
     start = {name: value.clone() for name, value in net.state_dict().items() if _learns(name)}
     net.averaged = Averaged(net)  # type: ignore[assignment]
     words = Words(PhraseSampler(table), torch.Generator().manual_seed(options.seed))
-    options = _steadily(options, EMA_DECAY)
+    options = _steadily(options)
     stage = few_stage(sets.told.bank, weights)
     state = train_stage(net, stage, FewSet(sets.told, sets.silent, rooms), words, run_dir, options, kept)
     del net.averaged
@@ -160,35 +146,11 @@ def _go_back(network: LangFlashNet, start: Mapping[str, Tensor]) -> None:
             value.lerp_(start[name].to(value), 1 - LEARNED)
 
 
-def train_twice(
-    network: LangFlashNet,
-    sets: Sets,
-    rooms: RoomSet | None,
-    table: PhraseTable,
-    run_dir: Path,
-    options: LoopOptions,
-    kept: KeptPhotos | None = None,
-    weights: "twice.Weights | None" = None,
-) -> LoopState:
-    """Train whole late blocks and what reads them by what they say themselves of photos seen better, from
-    all sets together, and cut the blocks: `RUN/late.pt`, and `RUN/late_twice.pt` to go on from."""
-    net = guided(network)
-    make_whole(net)
-    copy = twice.Copy(net)
-    words = Words(PhraseSampler(table), torch.Generator().manual_seed(options.seed))
-    options = _steadily(options, TWICE_DECAY)
-    stage = twice.twice_stage(sets.told.bank, copy, weights)
-    state = train_stage(net, stage, FewSet(sets.together(), None, rooms), words, run_dir, options, kept)
-    make_cut(net, pictures(sets.told.sets[0].held))
-    save_cut(run_dir / "late.pt", net, replace(stage, name="late", modules=MODULES), state)
-    return state
-
-
-def _steadily(options: LoopOptions, decay: float) -> LoopOptions:
-    """With that averaging of weights, and a short warm-up where nobody asked for another."""
+def _steadily(options: LoopOptions) -> LoopOptions:
+    """With averaged weights, and a short warm-up where nobody asked for another."""
     asked = options.optimising
     rule = replace(asked, warm_up=WARM_UP) if asked == Optimising() else asked
-    return replace(options, ema_decay=decay, optimising=rule)
+    return replace(options, ema_decay=EMA_DECAY, optimising=rule)
 
 
 def _learns(name: str) -> bool:

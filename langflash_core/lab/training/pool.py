@@ -14,7 +14,7 @@ import torch
 from torch import Tensor
 
 from langflash_core.lab.photos import PhotoFolder
-from langflash_core.lab.photos.fitting import Box, FittedPhoto, drawn_window, fitted
+from langflash_core.lab.photos.fitting import FittedPhoto, drawn_window, fitted
 from langflash_core.lab.photos.folder import LabelledPhoto
 from langflash_core.lab.training.bank import NameBank, NamedSet, Shown
 from langflash_core.lab.training.live import SIZES, relit, weathered
@@ -23,16 +23,13 @@ RARER = 0.5
 """A photo is drawn by (how many photos show its rarest name)^-RARER."""
 WHOLE = 0.5
 """A set of whose pixels at least this share has a name is labelled; others are in part, or not at all."""
-LARGER = 17 / 14
-"""Sides of a larger picture, in whole patches, in shares of the drawn one's."""
 
 
 @dataclass(frozen=True)
 class DrawnPhotos:
     """images and relit (B, 1, 3, H, W) in [0, 1], own light and another; classes and names (B, H, W) rows of
     the bank, -1 = unknown; sets (B,): which set each is of; depths (B, H, W) metres, 0 = unknown; Ks
-    (B, 1, 3, 3); opinions (B, H, W) of another network, -1 = none; seeds (B): of the photos; large and
-    large_Ks: the same windows in more pixels, or None.
+    (B, 1, 3, 3); opinions (B, H, W) of another network, -1 = none; seeds (B): of the photos.
 
     Drawn, they are whole numbers of one and two bytes, which processes pass on; `to` makes them these."""
 
@@ -45,8 +42,6 @@ class DrawnPhotos:
     Ks: Tensor
     opinions: Tensor
     seeds: tuple[str, ...] = ()
-    large: Tensor | None = None
-    large_Ks: Tensor | None = None
 
     def to(self, device: str | torch.device) -> "DrawnPhotos":
         own = {field.name: getattr(self, field.name) for field in fields(self)}
@@ -108,13 +103,12 @@ def labelled_share(photos: PhotoSet) -> float:
 @dataclass(frozen=True)
 class PhotoPool:
     """Some of the sets that a bank knows. numbers: their places in it; strong: their other light is always
-    that of another camera, and they keep their own beside it; larger: larger pictures come with them."""
+    that of another camera, and they keep their own beside it."""
 
     sets: tuple[PhotoSet, ...]
     numbers: tuple[int, ...]
     bank: NameBank
     strong: bool = False
-    larger: bool = False
 
     def __len__(self) -> int:
         return sum(len(one.ids) for one in self.sets)
@@ -129,8 +123,7 @@ class PhotoPool:
         seeds = torch.randint(2**31, (count,), generator=generator).tolist()
         photos = [self.sets[s].photo(row) for s, row in zip(drawn, rows, strict=True)]
         windows = [drawn_window(photo, size, seed) for photo, seed in zip(photos, seeds, strict=True)]
-        views = _through(photos, windows, size)
-        large = _through(photos, windows, larger(size)) if self.larger else []
+        views = [fitted(photo, size, *window) for photo, window in zip(photos, windows, strict=True)]
         light: Callable = weathered if self.strong else relit
         other = torch.stack([light(view.rgb, generator) for view in views])[:, None]
         numbers = [self.numbers[s] for s in drawn]
@@ -144,21 +137,7 @@ class PhotoPool:
             _lenses(views),
             torch.stack([view.opinions for view in views]).short(),
             tuple(f"{self.sets[s].folder.root.name}/{p.id}" for s, p in zip(drawn, photos, strict=True)),
-            _pictures(large) if large else None,
-            _lenses(large) if large else None,
         )
-
-
-def larger(size: tuple[int, int]) -> tuple[int, int]:
-    """(width, height) of the larger picture, in whole patches of 14."""
-    width, height = (14 * round(LARGER * side / 14) for side in size)
-    return width, height
-
-
-def _through(
-    photos: Sequence[LabelledPhoto], windows: Sequence[tuple[Box, bool]], size: tuple[int, int]
-) -> list[FittedPhoto]:
-    return [fitted(photo, size, *window) for photo, window in zip(photos, windows, strict=True)]
 
 
 def _pictures(views: Sequence[FittedPhoto]) -> Tensor:

@@ -99,6 +99,7 @@ def test_weights_verify_notices_damage(run, checkpoint, tmp_path):
         ),
         (
             [
+                "lab",
                 "train",
                 "run",
                 ".",
@@ -271,9 +272,6 @@ def test_the_late_half_goes_on_with_other_photos(run, checkpoint, photos, tmp_pa
     outcome = run("lab", "train", "late", tmp_path / "cache", *words, *where)
     assert outcome.code == 0 and "1 steps" in outcome.out, outcome.err
     assert {path.name for path in (tmp_path / "run").glob("*.pt")} == {"late.pt", "late_few.pt"}
-    where = ("-o", tmp_path / "twice", "--start", checkpoint)
-    assert run("lab", "train", "late", tmp_path / "cache", *words, *where, "--twice").code == 0
-    assert {path.name for path in (tmp_path / "twice").glob("*.pt")} == {"late.pt", "late_twice.pt"}
     words = ("--photos", photos, "--more", tmp_path / "gone", "--minutes", "5")
     assert "gone/images" in run("lab", "train", "late", tmp_path / "cache", *words, *where).err
 
@@ -481,6 +479,7 @@ def test_a_walk_is_judged_kept_and_judged_beside_itself(run, checkpoint, tmp_pat
         ),
         (
             [
+                "lab",
                 "train",
                 "second",
                 ".",
@@ -500,8 +499,8 @@ def test_a_walk_is_judged_kept_and_judged_beside_itself(run, checkpoint, tmp_pat
             "langflash lab train cache",
         ),
         (
-            ["lab", "train", "late", ".", "--photos", "PHOTOS", "-o", "out", "--minutes", "1", "--twice"],
-            "name some with --more",
+            ["lab", "train", "late", ".", "--photos", "PHOTOS", "-o", "out", "--minutes", "1", "--names"],
+            "--names goes with --more",
         ),
         (["lab", "train", "photos", "nyu", "gone", "-o", "out"], "there is no gone"),
         (

@@ -299,11 +299,6 @@ def _add_late(actions) -> None:
         action="store_true",
         help="with --more: names alone learn, depth stays as it is: a third more steps in the same time",
     )
-    late.add_argument(
-        "--twice",
-        action="store_true",
-        help="with --more: what the weights say of every photo mirrored and larger teaches them instead",
-    )
     _add_budget(late)
 
 
