@@ -22,6 +22,7 @@ from .evals.ablations import ablations
 from .evals.labels import labels
 from .evals.level import level
 from .evals.moved import moved
+from .evals.phrases import phrases
 from .evals.protocol import protocol
 from .evals.real import real
 from .evals.report import report
@@ -53,6 +54,7 @@ def run(args: Namespace, out: TextIO) -> None:
         "labels": labels,
         "level": level,
         "moved": moved,
+        "phrases": phrases,
         "protocol": protocol,
         "real": real,
         "report": report,

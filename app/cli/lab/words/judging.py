@@ -77,6 +77,7 @@ def add_eval(commands) -> None:
     _add_sharp(actions)
     _add_walk(actions)
     _add_real(actions)
+    _add_phrases(actions)
     _add_level(actions)
     _add_moved(actions)
     _add_labels(actions)
@@ -320,6 +321,24 @@ def _add_real(actions) -> None:
     command.add_argument("--no-own", action="store_true", help="leave out what fewer photos bring alone")
     command.add_argument("--lpips", type=Path, metavar="FILE", help="LPIPS weights of VGG-16, .safetensors")
     command.add_argument("--sheet", type=Path, metavar="IMG", help="also frames and scenes, as .png")
+    _add_judging(command)
+
+
+def _add_phrases(actions) -> None:
+    command = new_command(
+        actions, "phrases", "phrases as people ask them of a real place, against outlines made by hand"
+    )
+    command.add_argument("frames", type=Path, metavar="FRAMES", help="a folder of the place's frames")
+    command.add_argument(
+        "place",
+        type=Path,
+        metavar="PLACE",
+        help="what stands where in them: langflash_core/lab/evaluation/asked",
+    )
+    command.add_argument(
+        "--photos", type=whole_count, metavar="N", help="of the scene, beside the frames asked (default: 8)"
+    )
+    command.add_argument("--sheet", type=Path, metavar="IMG", help="also what each phrase lights, as .png")
     _add_judging(command)
 
 
