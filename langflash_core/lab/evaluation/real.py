@@ -174,14 +174,18 @@ def _made(frames: Sequence[Path], walk: _Walk, bench: Bench) -> Scene:
     return wordless(fused(scene) if bench.fused else scene)
 
 
-def _fewer(frame: Path, kept: Sequence[Path], walk: _Walk, bench: Bench) -> Scene:
-    """What a photo makes alone, or the two around a frame that was held back, in the walk's world."""
-    if frame in kept:
-        return _made([frame], walk, bench)
-    order = sorted((*kept, frame), key=walk.frames.index)
-    place = order.index(frame)
-    around = order[max(0, place - 1) : place] + order[place + 1 : place + 2]
-    return _made(around, walk, bench)
+def _fewer(frame: Path, kept: Sequence[Path], walk: _Walk, bench: Bench) -> Scene | None:
+    """What a photo makes alone, or the two around a frame that was held back, in the walk's world; None where
+    those two show nothing in common."""
+    some = [frame]
+    if frame not in kept:
+        order = sorted((*kept, frame), key=walk.frames.index)
+        place = order.index(frame)
+        some = order[max(0, place - 1) : place] + order[place + 1 : place + 2]
+    try:
+        return _made(some, walk, bench)
+    except InputError:
+        return None
 
 
 def _row(
@@ -218,18 +222,25 @@ def summary(cases: Sequence[dict]) -> dict:
 
 
 def _means(case: dict) -> dict:
-    return {kind: {key: nan_mean(r[key] for r in rows) for key in rows[0]} for kind, rows in _rows(case)}
+    return {
+        kind: {key: nan_mean(row[key] for row in rows if key in row) for key in _keys(rows)}
+        for kind, rows in _rows(case)
+    }
 
 
 def _worst(case: dict) -> dict:
     return {
         kind: {
-            key: WORST[name](row[key] for row in rows)
-            for key in rows[0]
+            key: WORST[name](row[key] for row in rows if key in row)
+            for key in _keys(rows)
             if (name := key.removeprefix(f"{ALONE}_")) in WORST
         }
         for kind, rows in _rows(case)
     }
+
+
+def _keys(rows: list[dict]) -> list[str]:
+    return list(dict.fromkeys(key for row in rows for key in row))
 
 
 def _rows(case: dict) -> list[tuple[str, list[dict]]]:

@@ -38,6 +38,7 @@ def test_more_photos_than_frames_are_refused(count, photos):
 def test_the_table_says_the_worst_and_leaves_out_what_was_not_judged():
     row = {"psnr": 30.0, "structure": 0.9, "fog": 0.0, "covered": 1.0}
     case = {"photos": 2, "placed": 1.0, "gaussians": 9.0, "seconds": 1.0, "cpu_seconds": 1.0, "between": {}}
-    case["own"] = {"a": row, "b": {**row, "psnr": 34.0, "fog": 0.1}}
+    case["own"] = {"a": row, "b": {**row, "psnr": 34.0, "fog": 0.1, "alone_psnr": 20.0}}  # one found nothing
     table = real_markdown(summary([case]))
     assert "32.00 (30.00)" in table and "5.00 (10.00)" in table and "held back" not in table
+    assert "| 32.00 (30.00) | 20.00 (20.00) |" in table
