@@ -184,7 +184,9 @@ def judge_place(
     """
     asked = [name for name in place.frames if name in frames]
     if not asked:
-        raise InputError(f"none of the frames {', '.join(place.frames)} found a place in the scene; take more photos")
+        raise InputError(
+            f"none of the frames {', '.join(place.frames)} found a place in the scene; take more photos"
+        )
     results: dict[str, QueryResult] = {}
     for number, name in enumerate(asked):
         progress(name, number / len(asked))
