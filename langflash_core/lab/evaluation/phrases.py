@@ -174,7 +174,7 @@ def judge_place(
     progress: Progress = lambda stage, fraction: None,
     shown: Shown | None = None,
 ) -> list[Verdict]:
-    """A verdict a phrase of a place.
+    """A verdict a phrase of a place; none of what only frames show that found no place in the scene.
 
     Args:
         frames: name -> its view in the scene, and (width, height) of the photo. shown: gets what was lit.
@@ -191,10 +191,9 @@ def judge_place(
     for number, name in enumerate(asked):
         progress(name, number / len(asked))
         results[name] = query(scene, place.phrases, view=frames[name][0], render=render)
-    return [
-        _verdict(place, row, phrase, results, frames, {} if shown is None else shown)
-        for row, phrase in enumerate(place.phrases)
-    ]
+    shown = {} if shown is None else shown
+    found = (_verdict(place, row, phrase, results, frames, shown) for row, phrase in enumerate(place.phrases))
+    return [one for one in found if one is not None]
 
 
 def _verdict(
@@ -204,7 +203,7 @@ def _verdict(
     results: Mapping[str, QueryResult],
     frames: Mapping[str, tuple[int, tuple[int, int]]],
     shown: Shown,
-) -> Verdict:
+) -> Verdict | None:
     regions: dict[str, list] = {}
     for name, result in results.items():
         mask = result.masks[row].cpu().numpy()
@@ -216,9 +215,7 @@ def _verdict(
     masks = [results[name].masks[row].cpu().numpy() for name in regions]
     score = max((results[name].answers[row].score for name in regions), default=0.0)
     if phrase in place.there:
-        if not regions:
-            raise InputError(f'no frame of the scene shows "{phrase}" of {place.name}; give all its frames')
-        return judged(phrase, masks, list(regions.values()), score)
+        return judged(phrase, masks, list(regions.values()), score) if regions else None
     return Verdict(phrase, CLAIMED if any(mask.any() for mask in masks) else HONEST, score)
 
 
