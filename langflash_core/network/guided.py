@@ -18,9 +18,9 @@ from torch.nn import functional as F
 from langflash_core.geometry.cameras import rays
 from langflash_core.keeping import MATCHES
 from langflash_core.memory import give_back
-from langflash_core.network.encoders.deeplab import DeepLab
 from langflash_core.network.encoders.late import LateHalf, with_taught
 from langflash_core.network.encoders.local import LocalFeatures
+from langflash_core.network.encoders.others import OtherEyes
 from langflash_core.network.encoders.shared import Encoder, Tokens, tokens_to_maps
 from langflash_core.network.gaussians import GaussianHead, assemble_gaussians
 from langflash_core.network.layers.decoder import SiameseDecoder, TwoStackDecoder
@@ -69,11 +69,11 @@ class GuidedDepthNet(LangFlashNet):
     Trained stage by stage: `depth` = decoder + depth_head, `refine` = refiner, `gaussians` =
     gaussian_head, `language` = language_head, `grouping` = siamese + scratch + grouping,
     `aggregation` = aggregation, `naming` = namer; `late` and `deep`, the halves that real photos taught names
-    and depth, learn before (`train late`); `second_head` reads DeepLab's maps (`train second`). The encoder,
-    the local features and DeepLab stay frozen.
+    and depth, learn before (`train late`); `second_head` reads the other networks' maps (`train second`). The
+    encoder, the local features and the other networks stay frozen.
     """
 
-    frozen = ("encoder", "local", "deeplab")
+    frozen = ("encoder", "local", "others")
     compact = True
     bfloat16_on_cpu = False  # a seventh of a second quicker, and a part in forty merges otherwise
     surfaces = True
@@ -98,7 +98,7 @@ class GuidedDepthNet(LangFlashNet):
         self.grouping = SemanticGrouping(preset)
         self.aggregation = Aggregation(preset)
         self.namer = PartNamer(preset)
-        self.deeplab = DeepLab()
+        self.others = OtherEyes()
         self.second_head = SecondHead(preset)
 
     def begin_halves(self) -> None:
@@ -250,14 +250,14 @@ class GuidedDepthNet(LangFlashNet):
     def named(
         self, atoms: Float[Tensor, "K C"], weights: Float[Tensor, "V K H W"], seen: Seen
     ) -> Float[Tensor, "K C"]:
-        """Atoms corrected by deep tokens, places and each other, and by what a second network says."""
+        """Atoms corrected by deep tokens, places and each other, and by what other networks say."""
         if len(atoms) == 0:
             return atoms
         where = places(weights, seen.depths, seen.viewmats, seen.Ks)
         named = self.namer(atoms, describe(weights, seen.tokens), where)
         if self.second_head.silent:
             return named
-        return both(named, looked_at(self.deeplab, self.second_head, seen.images, weights))
+        return both(named, looked_at(self.others, self.second_head, seen.pictures(), weights))
 
     def reconstruct(
         self,

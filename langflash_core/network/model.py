@@ -6,6 +6,8 @@ from collections.abc import Callable, Iterator, Mapping, Sequence
 from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, replace
 
+import cv2
+import numpy as np
 import torch
 from jaxtyping import Float
 from torch import Tensor, nn
@@ -43,13 +45,24 @@ class Geometry:
 @dataclass(frozen=True)
 class Seen:
     """What tells a part's name besides language features: images (V, 3, H, W) in [0, 1], tokens of the scene
-    (B = 1), depths (V, H, W), viewmats (V, 4, 4) and Ks (V, 3, 3) of all its views."""
+    (B = 1), depths (V, H, W), viewmats (V, 4, 4) and Ks (V, 3, 3) of all its views; sources: the photos as
+    `Views` has them, larger."""
 
     images: Float[Tensor, "V 3 H W"]
     tokens: Tokens
     depths: Float[Tensor, "V H W"]
     viewmats: Float[Tensor, "V 4 4"]
     Ks: Float[Tensor, "V 3 3"]
+    sources: tuple[bytes, ...] = ()
+
+    def pictures(self) -> Iterator[Float[Tensor, "1 3 _ _"]]:
+        """The largest version of every photo at hand, one after the other, (1, 3, h, w) in [0, 1]."""
+        if not self.sources:
+            yield from self.images.split(1)
+        for source in self.sources:
+            pixels = cv2.imdecode(np.frombuffer(source, np.uint8), cv2.IMREAD_COLOR_RGB)
+            assert pixels is not None, "they were read before"
+            yield torch.from_numpy(pixels).to(self.images.device).permute(2, 0, 1)[None] / 255
 
 
 class LangFlashNet(nn.Module):
@@ -275,7 +288,9 @@ class LangFlashNet(nn.Module):
         with run.stage("aggregation"):
             dictionaries = [
                 self.dictionary(
-                    w, f[None], Seen(x[0], own, found.depths, found.viewmats, views.Ks.to(device))
+                    w,
+                    f[None],
+                    Seen(x[0], own, found.depths, found.viewmats, views.Ks.to(device), views.sources),
                 )
                 if atoms is None
                 else atoms(w, f[None])

@@ -27,6 +27,6 @@ def posed_semantics(
     features = network.language(tokens, images)
     size = (images.shape[-2], images.shape[-1])
     weights = network.parts(tokens, images, size, features)
-    seen = Seen(images[0], tokens, depths.to(device), viewmats.to(device), Ks[0])
+    seen = Seen(images[0], tokens, depths.to(device), viewmats.to(device), Ks[0], views.sources)
     dictionary = network.dictionary(weights, features, seen)
     return weights.float().cpu(), dictionary.float().cpu()

@@ -11,7 +11,7 @@ from typing import Any, TextIO
 from langflash_core.errors import InputError, WeightsError
 from langflash_core.extras import optional_packages
 from langflash_core.files import check_folder, check_output_file, readable_file
-from langflash_core.lab.labels.lite import read_deeplab
+from langflash_core.lab.labels.lite import read_others
 from langflash_core.lab.labels.opinions import LiteNetwork, write_opinions
 from langflash_core.lab.labels.outlines import write_outlines
 from langflash_core.lab.labels.prompted import PromptedSam
@@ -160,13 +160,14 @@ def _late(args: Namespace, out: TextIO) -> None:
 def _second(args: Namespace, out: TextIO) -> None:
     folder, weights = _labelled(args), None
     if args.weights is not None:
-        readable_file(args.weights, "TensorFlow Lite network", WeightsError)
+        for path in args.weights:
+            readable_file(path, "TensorFlow Lite network", WeightsError)
         with optional_packages():
-            weights = read_deeplab(args.weights)
+            weights = read_others(*args.weights)
     with joined(args.device) as device:
         state = run_second(_learned_from(args, folder, device), weights=weights)
         if leads():
-            print(f"{args.output}: trained what reads the second network, {state.step} steps", file=out)
+            print(f"{args.output}: trained what reads the other networks, {state.step} steps", file=out)
 
 
 def _labelled(args: Namespace) -> PhotoFolder:

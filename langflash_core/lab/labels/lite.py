@@ -1,30 +1,22 @@
-"""Weights of DeepLab out of the TensorFlow Lite file that MLCommons publishes, in 8 bits, as float32.
+"""Weights of DeepLab and MOSAIC out of files of TensorFlow Lite, with weights in 8 bits, as float32.
 
-Found by the names that its layers had while it was trained; batch norms are in the convolutions already.
+Convolutions stand in a file in the order in which they run, as those of our own networks do; their names say
+little. A batch norm may follow as a product and a sum of channels: both go into the convolution.
 """
 
 import warnings
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 import torch
-from torch import Tensor
+from torch import Tensor, nn
 
 from langflash_core.errors import InputError
 from langflash_core.network.encoders.deeplab import DeepLab
+from langflash_core.network.encoders.mosaic import Mosaic
 
-_NAMES = {
-    "stem": ("MobilenetV2/Conv/",),
-    "near": ("aspp0",),
-    "whole": ("image_pooling",),
-    "both": ("concat_projection",),
-    "fine": ("feature_projection0",),
-    "last.0.depthwise": ("decoder_conv0_depthwise",),
-    "last.0.pointwise": ("decoder_conv0_pointwise",),
-    "last.1.depthwise": ("decoder_conv1_depthwise",),
-    "last.1.pointwise": ("decoder_conv1_pointwise",),
-}
 _KINDS = ("CONV_2D", "DEPTHWISE_CONV_2D")
 
 
@@ -46,53 +38,77 @@ def opened_lite(path: Path, threads: int = 1) -> Any:
     return network
 
 
-def read_deeplab(path: Path) -> dict[str, Tensor]:
-    """Float32 tensors of `DeepLab` by its own names.
+@dataclass
+class _Layer:
+    """weight (outputs, inputs, rows, columns) and bias (outputs,), float64."""
+
+    weight: np.ndarray
+    bias: np.ndarray
+
+
+def read_others(deeplab: Path, mosaic: Path) -> dict[str, Tensor]:
+    """Float32 tensors of `OtherEyes`, by its own names.
 
     Raises:
-        InputError: the file holds another network.
+        InputError: a file holds another network.
     """
-    found = _convolutions(opened_lite(path))
-    network = DeepLab()
+    both = {"deeplab": _tensors_of(deeplab, DeepLab()), "mosaic": _tensors_of(mosaic, Mosaic())}
+    return {f"{name}.{key}": value for name, tensors in both.items() for key, value in tensors.items()}
+
+
+def _tensors_of(path: Path, network: nn.Module) -> dict[str, Tensor]:
+    """Tensors for a network of convolutions whose modules stand in the order in which they run. What a file
+    has besides (layers that only give its scores) is left."""
+    found = iter(_convolutions(opened_lite(path)))
     tensors: dict[str, Tensor] = {}
     for name, module in network.named_modules():
-        if not isinstance(module, torch.nn.Conv2d):
+        if not isinstance(module, nn.Conv2d):
             continue
-        own = [layer for layer in found if all(part in layer[0] for part in _parts(name))]
-        if len(own) != 1 or own[0][1].shape != tuple(module.weight.shape):
+        own = next((layer for layer in found if layer.weight.shape == tuple(module.weight.shape)), None)
+        if own is None:
             raise InputError(
-                f"{path} is not the DeepLab of 32 names on MobileNetV2 (no layer {name}); give that one, "
-                "vision/deeplab in MLCommons' mobile_open"
+                f"{path} is not the {type(network).__name__} that is read here (no layer {name}); NOTICE "
+                "says which two files these are"
             )
-        tensors[f"{name}.weight"], tensors[f"{name}.bias"] = map(torch.from_numpy, own[0][1:])
+        tensors[f"{name}.weight"] = torch.from_numpy(np.ascontiguousarray(own.weight, np.float32))
+        tensors[f"{name}.bias"] = torch.from_numpy(own.bias.astype(np.float32))
     return tensors
 
 
-def _parts(name: str) -> tuple[str, ...]:
-    if not name.startswith("blocks."):
-        return _NAMES[name]
-    _, place, layer = name.split(".")
-    number = "" if place == "0" else f"_{place}"
-    return (f"expanded_conv{number}/{layer}/",)
-
-
-def _convolutions(network: Any) -> list[tuple[str, np.ndarray, np.ndarray]]:
-    """Name, weight (outputs, inputs, rows, columns) and bias of every convolution; unknown ones are left."""
+def _convolutions(network: Any) -> list[_Layer]:
+    """Every convolution, as it runs; what cannot be read is left."""
     details = {detail["index"]: detail for detail in network.get_tensor_details()}
+    packed: dict[int, int] = {}  # what is unpacked -> what it is unpacked from
+    found: list[_Layer] = []
 
     def values(index: int) -> np.ndarray:
-        steps = details[index]["quantization_parameters"]
-        whole = network.get_tensor(index).astype(np.float64)
-        return (whole - steps["zero_points"][0]) * steps["scales"][0]
+        index = packed.get(index, index)
+        return _unpacked(network.get_tensor(index), details[index]["quantization_parameters"])
 
-    found = []
-    for layer in network._get_ops_details():  # the interpreter says it nowhere else
-        if layer["op_name"] not in _KINDS:
-            continue
-        _, weight, bias = (int(index) for index in layer["inputs"])
-        order = (3, 0, 1, 2) if layer["op_name"] == _KINDS[1] else (0, 3, 1, 2)
-        if details[weight]["quantization_parameters"]["scales"].size != 1 or values(weight).ndim != 4:
-            continue
-        numbers = np.ascontiguousarray(values(weight).transpose(order), np.float32)
-        found.append((details[int(layer["outputs"][0])]["name"], numbers, values(bias).astype(np.float32)))
+    def of_channels(index: int) -> bool:
+        return index in details and found != [] and tuple(details[index]["shape"]) == found[-1].bias.shape
+
+    for step in network._get_ops_details():  # the interpreter says it nowhere else
+        kind, inputs = step["op_name"], [int(index) for index in step["inputs"]]
+        if kind == "DEQUANTIZE":
+            packed[int(step["outputs"][0])] = inputs[0]
+        elif kind in _KINDS:
+            order = (3, 0, 1, 2) if kind == _KINDS[1] else (0, 3, 1, 2)
+            found.append(_Layer(values(inputs[1]).transpose(order), values(inputs[2])))
+        elif kind == "MUL" and of_channels(inputs[1]):
+            factors = values(inputs[1])
+            found[-1] = _Layer(found[-1].weight * factors[:, None, None, None], found[-1].bias * factors)
+        elif kind == "ADD" and of_channels(inputs[1]):
+            found[-1].bias = found[-1].bias + values(inputs[1])
     return found
+
+
+def _unpacked(stored: np.ndarray, steps: dict) -> np.ndarray:
+    """Whole numbers as float64, by one step or one a channel; floats as they are."""
+    scales, zeros = steps["scales"].astype(np.float64), steps["zero_points"].astype(np.float64)
+    if not len(scales):
+        return stored.astype(np.float64)
+    shape = [1] * stored.ndim
+    if len(scales) > 1:
+        shape[steps["quantized_dimension"]] = -1
+    return (stored.astype(np.float64) - zeros.reshape(shape)) * scales.reshape(shape)

@@ -255,20 +255,20 @@ def run_late(given: PhotoRun, *, names: bool = False) -> LoopState:
 
 
 def run_second(given: PhotoRun, *, weights: Mapping[str, Tensor] | None = None) -> LoopState:
-    """Train what reads the second network's maps, on labelled photos and the cached rooms.
+    """Train what reads the other networks' maps, on labelled photos and the cached rooms.
 
     Args:
-        weights: of the second network (`DeepLab`); None: those that the run begins with.
+        weights: of the other networks (`OtherEyes`); None: those that the run begins with.
 
     Raises:
-        InputError: no cache, no second network, or a photo cannot be used.
+        InputError: no cache, no other networks, or a photo cannot be used.
     """
     rooms, network = given.rooms(), guided(given.network())
     rooms.tokens = False
     if weights is not None:
-        network.deeplab.load_state_dict(weights)
-    if not bool(network.deeplab.stem.weight.any()):
-        raise InputError(f"{given.start} holds no second network; give one with --weights")
+        network.others.load_state_dict(weights)
+    if not bool(network.others.deeplab.stem.weight.any()):
+        raise InputError(f"{given.start} holds no other networks; give both with --weights")
     learned = given.sets().named()
     judged = (
         PhotoPool((PhotoSet.of(given.photos, given.kept, 1.0),), (0,), learned.bank) if given.kept else None

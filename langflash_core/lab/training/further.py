@@ -118,7 +118,7 @@ def train_second(
     run_dir: Path,
     options: LoopOptions,
 ) -> LoopState:
-    """Train what reads the second network's maps, from nothing, judged by `kept`: `RUN/second.pt`. rooms: it
+    """Train what reads the other networks' maps, from nothing, judged by `kept`: `RUN/second.pt`. rooms: it
     learns to tell them from photos.
 
     Raises:
@@ -129,11 +129,11 @@ def train_second(
         torch.manual_seed(options.seed)
         net.second_head.begin()
     words = Words(PhraseSampler(table), torch.Generator().manual_seed(options.seed))
-    net.deeplab.to(options.device)
-    seen = room_pixels(net.deeplab, rooms, words.generator)
-    pixels = PixelSet.of(net.deeplab, photos, words.generator, seen)
+    net.others.to(options.device)
+    seen = room_pixels(net.others, rooms, words.generator)
+    pixels = PixelSet.of(net.others, photos, words.generator, seen)
     pixels.check()
-    judge = None if kept is None else KeptPixels(PixelSet.of(net.deeplab, kept, words.generator), photos.bank)
+    judge = None if kept is None else KeptPixels(PixelSet.of(net.others, kept, words.generator), photos.bank)
     # What phrases are compared with is true of no pixel.
     stage = second_stage(photos.bank.denying(table.embeddings[table.baseline_rows()]))
     return train_stage(net, stage, pixels, words, run_dir, options, judge)

@@ -1,11 +1,12 @@
-"""The stage that learns what a second network's maps mean in the language space: `train second`.
+"""The stage that learns what other networks' maps mean in the language space: `train second`.
 
-The network itself stays as it is, so that its maps of every photo are found once and pixels of all photos
+Those networks stay as they are, so that their maps of every photo are found once and pixels of all photos
 are drawn from them. One layer reads them and learns alone what they are called among the 37 classes and all
 names that the photos' sets have, and that none of them is "object", "things", "stuff" or "texture", which
 phrases are compared with. Whoever learned beside the first network, which knows the learned photos by heart,
 would be heard too little. Another layer learns to tell photos' pixels from those of rendered rooms, of which
-the second network knows nothing that the first does not.
+the others know nothing that the first does not. Every fourth photo is seen as small as rooms are, so that it
+is not sharpness that tells them apart.
 
 Sizes: P pixels, F channels of the maps, V views.
 
@@ -32,7 +33,7 @@ from langflash_core.lab.training.measures import accuracy, confusion, mean_iou
 from langflash_core.lab.training.pool import WHOLE, PhotoPool, labelled_share
 from langflash_core.lab.training.stages.pixels import nearest
 from langflash_core.lab.training.stages.stage import Loss, Stage, as_numbers, guided
-from langflash_core.network.encoders.deeplab import CHANNELS, DeepLab
+from langflash_core.network.encoders.others import CHANNELS, SIDE, OtherEyes
 from langflash_core.network.guided import GuidedDepthNet
 from langflash_core.network.model import LangFlashNet
 
@@ -40,7 +41,7 @@ log = logging.getLogger(__name__)
 
 NAME = "second"
 """Of the stage, under which a run keeps it."""
-MODULES = ("second_head", "deeplab")
+MODULES = ("second_head", "others")
 NAMES = 0.5
 """What names count beside classes."""
 PIXELS = 1500
@@ -52,16 +53,20 @@ ROOM_PIXELS = 300
 DRAWN = 750
 """Of a step, for each of its pictures."""
 GRID = 3.5
-"""Pixels of a photo to one of the maps along a side: four to a patch, as L(x) has them."""
+"""Pixels of a photo, as the first network sees it, to one of the maps along a side: four to a patch, as L(x)
+has them."""
+SMALL = 4
+"""Of so many photos one is seen as the first network sees it."""
+_SHARP = (SIDE, round(SIDE * SIZES[0][1] / SIZES[0][0]))  # (width, height) at which the others see them
 
 
 @torch.inference_mode()
-def room_pixels(deeplab: DeepLab, rooms: RoomSet, generator: torch.Generator) -> Tensor:
+def room_pixels(others: OtherEyes, rooms: RoomSet, generator: torch.Generator) -> Tensor:
     """Maps (P, F) of pixels of two views of every room, half precision."""
     maps = []
     for room in rooms.walk(1, views=2):
         for image in room.images[0]:
-            found = _maps(deeplab, image).flatten(1).T
+            found = _maps(others, image, (image.shape[-2], image.shape[-1])).flatten(1).T
             drawn = torch.randperm(len(found), generator=generator)[:ROOM_PIXELS]
             maps.append(found[drawn.to(found.device)].half().cpu())
     log.info("%d rooms looked at", len(rooms))
@@ -96,7 +101,7 @@ class PixelBatch:
 
 class PixelSet:
     """Named pixels of all photos, from which those of a step are drawn, and pixels of rooms (R, F), unnamed;
-    maps in half precision, 512 bytes each."""
+    maps in half precision, 1,152 bytes each."""
 
     def __init__(self, table: PixelBatch, rooms: Tensor | None = None):
         self.table, self.rooms = table, rooms
@@ -109,9 +114,9 @@ class PixelSet:
     @staticmethod
     @torch.inference_mode()
     def of(
-        deeplab: DeepLab, pool: PhotoPool, generator: torch.Generator, rooms: Tensor | None = None
+        others: OtherEyes, pool: PhotoPool, generator: torch.Generator, rooms: Tensor | None = None
     ) -> "PixelSet":
-        """The second network looks at every photo once, as it is.
+        """The other networks look at every photo once.
 
         Raises:
             InputError: a photo or its labels cannot be used.
@@ -124,8 +129,10 @@ class PixelSet:
         filled = 0
         for one, number, most in zip(pool.sets, pool.numbers, most_of, strict=True):
             for row in range(len(one.ids)):
-                view = fitted(one.photo(row), SIZES[0])
-                maps = _maps(deeplab, view.rgb.float() / 255)
+                photo = one.photo(row)
+                view = fitted(photo, SIZES[0])
+                sharp = view if row % SMALL == 0 else fitted(photo, _SHARP)
+                maps = _maps(others, sharp.rgb.float() / 255, (view.rgb.shape[-2], view.rgb.shape[-1]))
                 ids = nearest(view.labels, (maps.shape[-2], maps.shape[-1])).flatten()
                 of_class, of_name = pool.bank.class_of[number][ids], pool.bank.name_of[number][ids]
                 known = ((of_class >= 0) | (of_name >= 0)).nonzero()[:, 0]
@@ -184,10 +191,10 @@ class KeptPixels:
 
 
 def second_stage(bank: NameBank) -> Stage:
-    """The layers that read the second network, which itself learns nothing."""
+    """The layers that read the other networks, which themselves learn nothing."""
     return Stage(
         NAME, MODULES, (), {1: 1.0}, 8, 2e-3,
-        lambda network, batch, words: _loss(guided(network), batch, bank), rates={"deeplab": 0.0},
+        lambda network, batch, words: _loss(guided(network), batch, bank), rates={"others": 0.0},
     )  # fmt: skip
 
 
@@ -209,8 +216,9 @@ def _photo_loss(photos: Tensor, rooms: Tensor) -> Tensor:
     return (F.softplus(-photos).mean() + F.softplus(rooms).mean()) / 2
 
 
-def _maps(deeplab: DeepLab, image: Tensor) -> Tensor:
-    """Maps (F, h, w) of one picture (3, H, W) in [0, 1], as many a patch as L(x) has."""
-    size = (round(image.shape[-2] / GRID), round(image.shape[-1] / GRID))
-    maps = deeplab(image[None].to(deeplab.stem.weight.device))
+def _maps(others: OtherEyes, picture: Tensor, seen: tuple[int, int]) -> Tensor:
+    """Maps (F, h, w) of one picture (3, H, W) in [0, 1], as many a patch as L(x) has where the first network
+    sees it at `seen` (height, width)."""
+    size = (round(seen[0] / GRID), round(seen[1] / GRID))
+    maps = others(picture[None].to(others.deeplab.stem.weight.device))
     return F.interpolate(maps, size, mode="bilinear", align_corners=False)[0]

@@ -20,8 +20,8 @@ from langflash_core.network.build import build_network, network_class
 from langflash_core.network.checkpoints.parts import TRAINED_HERE, write_part
 from langflash_core.network.checkpoints.store import assemble_network, finite
 from langflash_core.network.checkpoints.stored import Stored, dequantised, read_stored, weights_file
-from langflash_core.network.encoders.deeplab import DeepLab
 from langflash_core.network.encoders.local import convert
+from langflash_core.network.encoders.others import OtherEyes
 from langflash_core.network.guided import GuidedDepthNet
 from langflash_core.network.model import LangFlashNet
 from langflash_core.network.presets import PRESETS, GuidedDepth, Preset
@@ -162,11 +162,15 @@ def read_weights(path: Path) -> tuple[dict[str, Shaped[Tensor, "..."]], dict]:
 
 
 def completed(tensors: dict[str, Shaped[Tensor, "..."]]) -> dict[str, Shaped[Tensor, "..."]]:
-    """Tensors of a whole network, also from before depth had a late half of its own, and from before a second
-    network was asked, which then says nothing."""
-    second = any(name.startswith("second_head.") for name in tensors)
+    """Tensors of a whole network, also from before depth had a late half of its own, and from before these
+    other networks were asked, which then say nothing."""
+    heard = any(name.startswith("others.") for name in tensors)
     whole = any(name.startswith("language_head.taught.") for name in tensors)
-    return with_deep(tensors) | (silent_second() if whole and not second else {})
+    if not whole or heard:
+        return with_deep(tensors)
+    earlier = ("deeplab.", "second_head.")  # of another network that was asked before
+    own = {name: value for name, value in tensors.items() if not name.startswith(earlier)}
+    return with_deep(own) | silent_second()
 
 
 def with_deep(tensors: dict[str, Shaped[Tensor, "..."]]) -> dict[str, Shaped[Tensor, "..."]]:
@@ -178,11 +182,11 @@ def with_deep(tensors: dict[str, Shaped[Tensor, "..."]]) -> dict[str, Shaped[Ten
 
 
 def silent_second() -> dict[str, Shaped[Tensor, "..."]]:
-    """Tensors of a second network that says nothing."""
+    """Tensors of other networks that say nothing."""
     preset = PRESETS["mini"]
     assert isinstance(preset, GuidedDepth)
     with torch.device("meta"):
-        modules = {"deeplab": DeepLab(), "second_head": SecondHead(preset)}
+        modules = {"others": OtherEyes(), "second_head": SecondHead(preset)}
     return {
         f"{name}.{key}": torch.zeros(value.shape)
         for name, module in modules.items()

@@ -1,12 +1,13 @@
-"""Another network's eyes: DeepLab on MobileNetV2, as MLCommons measures telephones with it.
+"""Another network's eyes: DeepLab on MobileNetV2, which learned the 150 names of ADE20K.
 
-It learned 32 names of ADE20K, so that it errs elsewhere than what reads our own encoder. Its names are not
-asked: what its last maps mean is read in the language space (`semantics.second`).
+It errs elsewhere than what reads our own encoder. Its names are not asked: what its last maps mean is read in
+the language space (`semantics.second`).
 
 Sizes: n pictures, h w a quarter of a picture's sides.
 
 Source: Chen et al. 2018 (DeepLabV3+); Sandler et al. 2018 (MobileNetV2). Batch norms lie in the convolutions
-before them, and the last halving is a dilation instead.
+before them. The last halving is a dilation instead, as it learned; the published file leaves out the one
+before as well, for twice the time.
 """
 
 import torch
@@ -14,9 +15,6 @@ from jaxtyping import Float
 from torch import Tensor, nn
 from torch.nn import functional as F
 
-SIDE = 378
-"""Pixels to which a picture's longer side is brought: of 252 half as many again, which names as well as
-512, in half the time (MEASURED.md)."""
 CHANNELS = 256
 """Of its last maps."""
 _LARGE = 10.0
@@ -74,7 +72,7 @@ class Separable(nn.Module):
 
 
 class DeepLab(nn.Module):
-    """Pictures -> what its scores would be read from, at a quarter of `SIDE`. Frozen."""
+    """Pictures -> what its scores would be read from, at a quarter of their sides. Frozen."""
 
     def __init__(self) -> None:
         super().__init__()
@@ -84,15 +82,15 @@ class DeepLab(nn.Module):
             blocks.append(Inverted(given, wider, channels, stride, 2 if place >= _DILATED else 1))
             given = channels
         self.blocks = nn.ModuleList(blocks)
-        self.near, self.whole = nn.Conv2d(given, CHANNELS, 1), nn.Conv2d(given, CHANNELS, 1)
+        self.whole, self.near = nn.Conv2d(given, CHANNELS, 1), nn.Conv2d(given, CHANNELS, 1)
         self.both = nn.Conv2d(2 * CHANNELS, CHANNELS, 1)
         inner = _BLOCKS[_FINE][0] * _BLOCKS[_FINE - 1][1]
         self.fine = nn.Conv2d(inner, 48, 1)
         self.last = nn.Sequential(Separable(CHANNELS + 48, CHANNELS), Separable(CHANNELS, CHANNELS))
 
-    def forward(self, images: Float[Tensor, "n 3 H W"]) -> Float[Tensor, "n 256 h w"]:
-        """Maps (n, 256, h, w), 0 or more, about 1, of pictures (n, 3, H, W) in [0, 1] of any size."""
-        x = (2 * seen(images) - 1).contiguous(memory_format=torch.channels_last)  # a third quicker
+    def forward(self, pictures: Float[Tensor, "n 3 H W"]) -> Float[Tensor, "n 256 h w"]:
+        """Maps (n, 256, h, w), 0 or more, about 1, of pictures (n, 3, H, W) in [0, 1]."""
+        x = (2 * pictures - 1).contiguous(memory_format=torch.channels_last)  # a third quicker
         x = F.relu6(self.stem(framed(x, self.stem)))
         fine = x
         for place, block in enumerate(self.blocks):
@@ -107,20 +105,12 @@ class DeepLab(nn.Module):
         return self.last(torch.cat((deep, fine), 1)) / _LARGE
 
 
-def seen(images: Float[Tensor, "n 3 H W"]) -> Float[Tensor, "n 3 _ _"]:
-    """Pictures (n, 3, H, W) as it sees them: the longer side is `SIDE`."""
-    height, width = images.shape[-2:]
-    scale = SIDE / max(height, width)
-    size = (max(1, round(scale * height)), max(1, round(scale * width)))
-    return F.interpolate(images, size, mode="bicubic", align_corners=False, antialias=scale < 1).clamp(0, 1)
-
-
 def framed(x: Float[Tensor, "n C h w"], layer: nn.Conv2d) -> Float[Tensor, "n C _ _"]:
-    """x with zeros around it, so that what a layer of 3 x 3 gives is as large as its stride allows; a row
-    that is over comes last, as TensorFlow has it."""
-    stride, dilation = layer.stride[0], layer.dilation[0]
+    """x with zeros around it, so that what a square layer gives is as large as its stride allows; a row that
+    is over comes last, as TensorFlow has it."""
+    stride, reach = layer.stride[0], layer.dilation[0] * (layer.kernel_size[0] - 1)
     sides: list[int] = []
     for length in (x.shape[-1], x.shape[-2]):
-        over = max(0, (-(-length // stride) - 1) * stride + 2 * dilation + 1 - length)
+        over = max(0, (-(-length // stride) - 1) * stride + reach + 1 - length)
         sides += [over // 2, over - over // 2]
     return F.pad(x, sides)

@@ -1,25 +1,26 @@
-"""What a second network says of parts, added to their names in the language space.
+"""What two other networks say of parts, added to their names in the language space.
 
-It sees photos with other eyes (`encoders.deeplab`), so that it errs elsewhere. One layer reads its maps and
-learned alone what they mean (`lab/training/second.py`): log odds of words are inner products with texts, as
-those of L(x) are. Their sum is that of both together, as far as they err independently (Bayes). It knows
-photos and is lost in rendered rooms, which look like nothing it learned from: another layer tells the two
-apart, and it is heard as far as a scene looks like photos.
+They see photos with other eyes (`encoders.others`), so that they err elsewhere. One layer reads their maps
+and learned alone what they mean (`lab/training/second.py`): log odds of words are inner products with texts,
+as those of L(x) are. Their sum is that of both together, as far as they err independently (Bayes). They know
+photos and are lost in rendered rooms, which look like nothing they learned from: another layer tells the two
+apart, and they are heard as far as a scene looks like photos.
 
-Sizes: V views, K parts, h w a map's own size, C channels of the language space.
+Sizes: V views, K parts, h w a map's own size, F channels of the maps, C of the language space.
 """
 
 import math
+from collections.abc import Iterable
 
 from jaxtyping import Float
 from torch import Tensor, nn
 from torch.nn import functional as F
 
-from langflash_core.network.encoders.deeplab import CHANNELS, DeepLab
+from langflash_core.network.encoders.others import CHANNELS, OtherEyes
 from langflash_core.network.presets import GuidedDepth
 
 COUNTS = 1.0
-"""What the second network counts beside an atom, whose length is 1; its own is as long as its pixels agree.
+"""What they count beside an atom, whose length is 1; what they say is as long as its pixels agree.
 More names photos hardly better (MEASURED.md)."""
 STEEPNESS = 10.0
 """Of what tells photos from rooms, so that it learns as fast as the words do: channels that tell them apart
@@ -31,8 +32,8 @@ PHOTOS = 3.0
 
 
 class SecondHead(nn.Module):
-    """Maps of `DeepLab` -> unit vectors of the language space, and how much they look like photos. Zeros: it
-    has learned nothing and is not asked."""
+    """Maps of `OtherEyes` -> unit vectors of the language space, and how much they look like photos. Zeros:
+    it has learned nothing and is not asked."""
 
     def __init__(self, preset: GuidedDepth):
         super().__init__()
@@ -47,10 +48,10 @@ class SecondHead(nn.Module):
         nn.init.zeros_(self.photo.weight)
         nn.init.zeros_(self.photo.bias)
 
-    def forward(self, maps: Float[Tensor, "... 256"]) -> Float[Tensor, "... C"]:
+    def forward(self, maps: Float[Tensor, "... F"]) -> Float[Tensor, "... C"]:
         return F.normalize(self.words(maps), dim=-1)
 
-    def photo_odds(self, maps: Float[Tensor, "... 256"]) -> Float[Tensor, "..."]:
+    def photo_odds(self, maps: Float[Tensor, "... F"]) -> Float[Tensor, "..."]:
         """Log odds that pixels are a photo's, not a rendered room's."""
         return STEEPNESS * self.photo(maps)[..., 0]
 
@@ -61,26 +62,26 @@ class SecondHead(nn.Module):
 
 
 def looked_at(
-    deeplab: DeepLab,
+    others: OtherEyes,
     head: SecondHead,
-    images: Float[Tensor, "V 3 H W"],
+    pictures: Iterable[Float[Tensor, "1 3 _ _"]],
     weights: Float[Tensor, "V K h w"],
 ) -> Float[Tensor, "K C"]:
-    """Means over every part of what the second network says, times how surely these are photos: length 0 to
+    """Means over every part of what the other networks say, times how surely these are photos: length 0 to
     1, (K, C).
 
     View by view: a processor's caches hold one.
 
     Args:
-        images: (V, 3, H, W) in [0, 1]. weights: w_k(x) of one scene, (V, K, h, w), any size.
+        pictures: of all views, in [0, 1], any size. weights: w_k(x) of one scene, (V, K, h, w), any size.
     """
     total = weights.new_zeros(weights.shape[1], head.words.out_features)
     odds = weights.new_zeros(())
     size = (weights.shape[-2], weights.shape[-1])
-    for image, own in zip(images.split(1), weights, strict=True):
-        maps = F.interpolate(deeplab(image), size, mode="bilinear", align_corners=False)[0].flatten(1).T
+    for picture, own in zip(pictures, weights, strict=True):
+        maps = F.interpolate(others(picture), size, mode="bilinear", align_corners=False)[0].flatten(1).T
         total = total + own.flatten(1) @ head(maps)
-        odds = odds + head.photo_odds(maps).mean() / len(images)
+        odds = odds + head.photo_odds(maps).mean() / len(weights)
     means = total / (weights.sum((0, 2, 3))[:, None] + 1e-6)
     return (TOGETHER * odds + math.log(PHOTOS)).sigmoid() * means
 

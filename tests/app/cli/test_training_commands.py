@@ -276,8 +276,8 @@ def test_the_late_half_goes_on_with_other_photos(run, checkpoint, photos, tmp_pa
     assert "gone/images" in run("lab", "train", "late", tmp_path / "cache", *words, *where).err
 
 
-def test_the_second_network_is_learned_to_be_read(run, checkpoint, photos, tmp_path):
-    """Two steps on six photos and a room; the layer that reads it moves, and nothing else."""
+def test_other_networks_are_learned_to_be_read(run, checkpoint, photos, tmp_path):
+    """Two steps on six photos and a room; the layer that reads them moves, and nothing else."""
     write_shard(tmp_path / "cache" / "train" / "a.safetensors", [toy_record(0)])
     few = ("--photos", photos, "-o", tmp_path / "few", "--minutes", "1", "--start", checkpoint)
     assert "no name that 5 of them show" in run("lab", "train", "second", tmp_path / "cache", *few).err
@@ -294,13 +294,13 @@ def test_the_second_network_is_learned_to_be_read(run, checkpoint, photos, tmp_p
     moved = {key.split(".")[0] for key in before if not torch.equal(before[key], after[key])}
     assert moved == {"second_head"}
     blind = GuidedDepthNet(MINI)
-    for value in blind.deeplab.parameters():
+    for value in blind.others.parameters():
         torch.nn.init.zeros_(value)
     save_network(blind, tmp_path / "blind.safetensors")
     refused = run(
         "lab", "train", "second", tmp_path / "cache", *words, "--start", tmp_path / "blind.safetensors"
     )
-    assert refused.code == 2 and "holds no second network; give one with --weights" in refused.err
+    assert refused.code == 2 and "holds no other networks; give both with --weights" in refused.err
 
 
 def test_the_grouping_learns_from_named_and_outlined_photos(run, checkpoint, photos, tmp_path):
@@ -491,6 +491,7 @@ def test_a_walk_is_judged_kept_and_judged_beside_itself(run, checkpoint, tmp_pat
                 "1",
                 "--weights",
                 "gone.tflite",
+                "gone2.tflite",
             ],
             "gone.tflite",
         ),

@@ -1,4 +1,4 @@
-"""Weights of DeepLab out of a file of TensorFlow Lite: one with its layers, in 8 bits, and others."""
+"""Weights of DeepLab and MOSAIC out of files of TensorFlow Lite: with their layers, in 8 bits, and others."""
 
 import flatbuffers
 import numpy as np
@@ -7,29 +7,15 @@ import torch
 from ai_edge_litert import schema_py_generated as schema
 
 from langflash_core.errors import InputError
-from langflash_core.lab.labels.lite import read_deeplab
+from langflash_core.lab.labels.lite import read_others
 from langflash_core.network.encoders.deeplab import DeepLab
+from langflash_core.network.encoders.mosaic import Mosaic
+from langflash_core.network.encoders.others import OtherEyes
 
-PUBLISHED = {
-    "stem": "MobilenetV2/Conv/Relu6",
-    "near": "aspp0/Relu",
-    "whole": "image_pooling/Relu",
-    "both": "concat_projection/Relu",
-    "fine": "decoder/feature_projection0/Relu",
-    "last.0.depthwise": "decoder/decoder_conv0_depthwise/Relu",
-    "last.0.pointwise": "decoder/decoder_conv0_pointwise/Relu",
-    "last.1.depthwise": "decoder/decoder_conv1_depthwise/Relu",
-    "last.1.pointwise": "decoder/decoder_conv1_pointwise/Relu",
-}
-"""Names that its layers have in the published file."""
-
-
-def published(name: str) -> str:
-    if name in PUBLISHED:
-        return PUBLISHED[name]
-    _, place, layer = name.split(".")
-    block = "expanded_conv" + ("" if place == "0" else f"_{place}")
-    return f"MobilenetV2/{block}/{layer}/" + ("add_fold" if layer == "project" else "Relu6")
+KINDS = ("CONV_2D", "DEPTHWISE_CONV_2D", "DEQUANTIZE", "MUL", "ADD")
+UINT8, INT8, INT32, FLOAT = (
+    getattr(schema.TensorType, name) for name in ("UINT8", "INT8", "INT32", "FLOAT32")
+)
 
 
 class Writer:
@@ -42,11 +28,13 @@ class Writer:
         self.inputs: list[int] = []
         self.outputs: list[int] = []
 
-    def tensor(self, name: str, shape, type, scale: float, zero: int, data: np.ndarray | None = None) -> int:
+    def tensor(self, shape, type, scale=(), zero=(), data: np.ndarray | None = None, along: int = 0) -> int:
         one = schema.TensorT()
-        one.name, one.shape, one.type = name, [int(n) for n in shape], type
-        one.quantization = schema.QuantizationParametersT()
-        one.quantization.scale, one.quantization.zeroPoint = [scale], [zero]
+        one.name, one.shape, one.type = f"t{len(self.tensors)}", [int(n) for n in shape], type
+        if len(scale):
+            one.quantization = schema.QuantizationParametersT()
+            one.quantization.scale, one.quantization.zeroPoint = list(scale), list(zero)
+            one.quantization.quantizedDimension = along
         one.buffer = 0
         if data is not None:
             buffer = schema.BufferT()
@@ -56,42 +44,84 @@ class Writer:
         self.tensors.append(one)
         return len(self.tensors) - 1
 
-    def convolution(self, name: str, layer: torch.nn.Conv2d, random: np.random.Generator) -> None:
-        """A layer with random steps of 8 bits, which `layer` then has."""
-        outputs, inputs = layer.weight.shape[:2]
+    def step(self, kind: str, inputs: list[int], output: int, options=None) -> int:
+        one = schema.OperatorT()
+        one.opcodeIndex, one.inputs, one.outputs = KINDS.index(kind), inputs, [output]
+        if options is not None:
+            name = type(options).__name__.removesuffix("T")
+            one.builtinOptionsType, one.builtinOptions = getattr(schema.BuiltinOptions, name), options
+        self.steps.append(one)
+        return output
+
+    def convolved(self, layer: torch.nn.Conv2d, given: int, weight: int, bias: int, result: int) -> int:
         depthwise = layer.groups > 1
-        steps = random.integers(0, 256, layer.weight.shape).astype(np.uint8)
-        bias = random.integers(-999, 999, outputs).astype(np.int32)
-        scale, zero = float(np.float32(random.uniform(0.01, 0.1))), int(random.integers(100, 150))
-        with torch.no_grad():
-            layer.weight.copy_(torch.from_numpy((steps.astype(np.float64) - zero) * np.float32(scale)))
-            layer.bias.copy_(torch.from_numpy(bias * np.float64(np.float32(scale / 128))))  # type: ignore[union-attr]
-        kernel = steps.transpose(1, 2, 3, 0) if depthwise else steps.transpose(0, 2, 3, 1)
-        channels = outputs if depthwise else inputs
-        uint8, int32 = schema.TensorType.UINT8, schema.TensorType.INT32
-        given = self.tensor(f"in_{name}", [1, 4, 4, channels], uint8, 1 / 128, 128)
-        weight = self.tensor(f"{name}_weights", kernel.shape, uint8, scale, zero, kernel)
-        added = self.tensor(f"{name}_bias", [outputs], int32, scale / 128, 0, bias)
-        result = self.tensor(name, [1, 4, 4, outputs], uint8, 1.0, 0)
-        step = schema.OperatorT()
-        step.opcodeIndex, step.inputs, step.outputs = int(depthwise), [given, weight, added], [result]
         options = schema.DepthwiseConv2DOptionsT() if depthwise else schema.Conv2DOptionsT()
         options.strideH = options.strideW = options.dilationHFactor = options.dilationWFactor = 1
         options.padding = schema.Padding.SAME
-        kinds = schema.BuiltinOptions
-        step.builtinOptionsType = kinds.DepthwiseConv2DOptions if depthwise else kinds.Conv2DOptions
         if isinstance(options, schema.DepthwiseConv2DOptionsT):
             options.depthMultiplier = 1
-        step.builtinOptions = options
-        self.steps.append(step)
         self.inputs.append(given)
-        self.outputs.append(result)
+        return self.step(KINDS[depthwise], [given, weight, bias], result, options)
+
+    def whole(self, layer: torch.nn.Conv2d, random: np.random.Generator) -> None:
+        """A layer of whole numbers, one step for all of them, which `layer` then has."""
+        outputs = layer.weight.shape[0]
+        steps = random.integers(0, 256, layer.weight.shape).astype(np.uint8)
+        bias = random.integers(-999, 999, outputs).astype(np.int32)
+        scale, zero = float(np.float32(random.uniform(0.01, 0.1))), int(random.integers(100, 150))
+        kernel = as_stored(steps, layer)
+        given = self.tensor([1, 4, 4, layer.in_channels], UINT8, [1 / 128], [128])
+        weight = self.tensor(kernel.shape, UINT8, [scale], [zero], kernel)
+        added = self.tensor([outputs], INT32, [scale / 128], [0], bias)
+        self.outputs.append(
+            self.convolved(layer, given, weight, added, self.tensor([1, 4, 4, outputs], UINT8, [1.0], [0]))
+        )
+        fill(
+            layer,
+            (steps.astype(np.float64) - zero) * np.float32(scale),
+            bias * np.float64(np.float32(scale / 128)),
+        )
+
+    def mixed(self, layer: torch.nn.Conv2d, random: np.random.Generator) -> None:
+        """A layer of floats; a depthwise one has whole numbers, a step for each channel, unpacked before it,
+        and a batch norm behind it."""
+        outputs = layer.weight.shape[0]
+        given = self.tensor([1, 4, 4, layer.in_channels], FLOAT)
+        result = self.tensor([1, 4, 4, outputs], FLOAT)
+        bias = random.normal(size=outputs).astype(np.float32)
+        added = self.tensor([outputs], FLOAT, data=bias)
+        if layer.groups == 1:
+            weights = random.normal(size=layer.weight.shape).astype(np.float32)
+            kernel = as_stored(weights, layer)
+            weight = self.tensor(kernel.shape, FLOAT, data=kernel)
+            self.outputs.append(self.convolved(layer, given, weight, added, result))
+            fill(layer, weights, bias)
+            return
+        steps = random.integers(-127, 128, layer.weight.shape).astype(np.int8)
+        scales = random.uniform(0.01, 0.1, outputs).astype(np.float32)
+        kernel = as_stored(steps, layer)
+        packed = self.tensor(kernel.shape, INT8, scales.tolist(), [0] * outputs, kernel, along=3)
+        weight = self.step(
+            "DEQUANTIZE", [packed], self.tensor(kernel.shape, FLOAT), schema.DequantizeOptionsT()
+        )
+        self.convolved(layer, given, weight, added, result)
+        factors, more = random.normal(size=(2, outputs)).astype(np.float32)
+        scaled, moved = (self.tensor([1, 4, 4, outputs], FLOAT) for _ in range(2))
+        of_channels = [self.tensor([outputs], FLOAT, data=values) for values in (factors, more)]
+        self.step("MUL", [result, of_channels[0]], scaled, schema.MulOptionsT())
+        self.outputs.append(self.step("ADD", [scaled, of_channels[1]], moved, schema.AddOptionsT()))
+        exact = steps.astype(np.float64) * scales.astype(np.float64)[:, None, None, None]
+        fill(
+            layer,
+            exact * factors.astype(np.float64)[:, None, None, None],
+            bias.astype(np.float64) * factors + more.astype(np.float64),
+        )
 
     def write(self, path) -> None:
         codes = []
-        for kind in (schema.BuiltinOperator.CONV_2D, schema.BuiltinOperator.DEPTHWISE_CONV_2D):
+        for kind in KINDS:
             code = schema.OperatorCodeT()
-            code.builtinCode = code.deprecatedBuiltinCode = kind
+            code.builtinCode = code.deprecatedBuiltinCode = getattr(schema.BuiltinOperator, kind)
             codes.append(code)
         graph = schema.SubGraphT()
         graph.tensors, graph.operators = self.tensors, self.steps
@@ -103,33 +133,62 @@ class Writer:
         path.write_bytes(bytes(builder.Output()))
 
 
-def written(path, leave: str = "") -> DeepLab:
-    """A file of random weights; layers whose names begin with `leave` are not in it."""
-    network, writer, random = DeepLab(), Writer(), np.random.default_rng(0)
+def as_stored(values: np.ndarray, layer: torch.nn.Conv2d) -> np.ndarray:
+    return values.transpose(1, 2, 3, 0) if layer.groups > 1 else values.transpose(0, 2, 3, 1)
+
+
+def fill(layer: torch.nn.Conv2d, weights: np.ndarray, bias: np.ndarray) -> None:
+    assert layer.bias is not None
+    with torch.no_grad():
+        layer.weight.copy_(torch.from_numpy(weights))
+        layer.bias.copy_(torch.from_numpy(bias))
+
+
+def written(path, network: torch.nn.Module, *, whole: bool, leave: str = "", more: bool = False):
+    """A file of random weights, which the network then has; layers whose names begin with `leave` are not in
+    it; more: with one in its midst that the network has not."""
+    writer, random = Writer(), np.random.default_rng(0)
+    put = writer.whole if whole else writer.mixed
     for name, layer in network.named_modules():
         if isinstance(layer, torch.nn.Conv2d) and not (leave and name.startswith(leave)):
-            writer.convolution(published(name), layer, random)
+            put(layer, random)
+        if more and name == "deep":
+            put(torch.nn.Conv2d(64, 33, 1), random)
     writer.write(path)
     return network
 
 
-def test_weights_are_found_by_the_names_of_layers(tmp_path):
-    network = written(tmp_path / "net.tflite")
-    found = read_deeplab(tmp_path / "net.tflite")
-    own = network.state_dict()
+@pytest.fixture
+def files(tmp_path):
+    """DeepLab as floats with batch norms, MOSAIC in whole numbers: as they are published."""
+    eyes = OtherEyes()
+    written(tmp_path / "deeplab.tflite", eyes.deeplab, whole=False)
+    written(tmp_path / "mosaic.tflite", eyes.mosaic, whole=True, more=True)
+    return eyes, tmp_path / "deeplab.tflite", tmp_path / "mosaic.tflite"
+
+
+def test_weights_are_found_in_the_order_of_layers(files):
+    eyes, *paths = files
+    found = read_others(*paths)
+    own = eyes.state_dict()
     assert found.keys() == own.keys()
     for name, value in own.items():
         assert torch.equal(found[name], value), name
 
 
-@pytest.mark.parametrize("layer", ["blocks.9.depthwise", "near"])
-def test_another_network_is_refused(tmp_path, layer):
-    written(tmp_path / "net.tflite", leave=layer)
-    with pytest.raises(InputError, match=f"no layer {layer}.*MLCommons"):
-        read_deeplab(tmp_path / "net.tflite")
+def test_another_network_is_refused(files, tmp_path):
+    _, deeplab, mosaic = files
+    with pytest.raises(InputError, match=r"not the DeepLab .*no layer .*NOTICE"):
+        read_others(mosaic, deeplab)
+    written(tmp_path / "net.tflite", DeepLab(), whole=False, leave="blocks.9.depthwise")
+    with pytest.raises(InputError, match=r"not the DeepLab "):
+        read_others(tmp_path / "net.tflite", mosaic)
+    written(tmp_path / "net.tflite", Mosaic(), whole=True, leave="both")
+    with pytest.raises(InputError, match=r"not the Mosaic .*no layer both"):
+        read_others(deeplab, tmp_path / "net.tflite")
 
 
 def test_what_is_no_network_is_refused(tmp_path):
     (tmp_path / "no.tflite").write_bytes(b"no network")
     with pytest.raises(InputError, match="no TensorFlow Lite network"):
-        read_deeplab(tmp_path / "no.tflite")
+        read_others(tmp_path / "no.tflite", tmp_path / "no.tflite")

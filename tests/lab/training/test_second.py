@@ -1,4 +1,4 @@
-"""Learning what a second network's maps mean: pixels that are drawn, that it learns, that a run keeps it."""
+"""Learning what other networks' maps mean: pixels that are drawn, that it learns, that a run keeps it."""
 
 import pytest
 import torch
@@ -41,7 +41,7 @@ def network():
     """One whose layers keep the size of what they read (He et al. 2015), so that maps tell colours apart."""
     torch.manual_seed(0)
     made = build_network(MINI).eval()
-    for layer in made.deeplab.modules():
+    for layer in made.others.modules():
         if isinstance(layer, torch.nn.Conv2d):
             torch.nn.init.kaiming_normal_(layer.weight)
     return made
@@ -49,7 +49,7 @@ def network():
 
 @pytest.fixture(scope="module")
 def pixels(learned, network):
-    return PixelSet.of(network.deeplab, learned, torch.Generator().manual_seed(0))
+    return PixelSet.of(network.others, learned, torch.Generator().manual_seed(0))
 
 
 def test_photos_without_names_are_left_and_partly_named_ones_give_less(learned, pixels):
@@ -87,7 +87,7 @@ def test_classes_come_as_they_are_and_names_alike():
 def test_photos_and_rooms_are_told_apart_and_what_is_denied_is_unsaid(network, learned, pixels, rooms, words):
     """After 100 steps on both. Layers are random and tell colours and edges alone, so that some pixels are
     never told apart; a coin is right of a half, and what has learned nothing of no pixel."""
-    seen = room_pixels(network.deeplab, rooms, words.generator)
+    seen = room_pixels(network.others, rooms, words.generator)
     assert seen.shape == (4 * 2 * ROOM_PIXELS, pixels.table.maps.shape[1])
     table = words.sampler.table
     nothing = table.embeddings[table.baseline_rows()]
@@ -122,14 +122,14 @@ def test_it_learns_and_a_run_keeps_it(learned, network, pixels, rooms, tmp_path)
     judge = KeptPixels(pixels, learned.bank)
     torch.manual_seed(2)
     network.second_head.begin()
-    before, eyes = judge(network), network.deeplab.stem.weight.clone()
+    before, eyes = judge(network), network.others.mosaic.stem.weight.clone()
     train_second(network, learned, None, rooms, table, tmp_path, options)
     after = judge(network)
     assert before["classes_accuracy"] < 0.5 and after["classes_accuracy"] > 0.75
-    assert torch.equal(network.deeplab.stem.weight.cpu(), eyes), "the network itself learns nothing"
+    assert torch.equal(network.others.mosaic.stem.weight.cpu(), eyes), "the others themselves learn nothing"
     torch.manual_seed(1)
     other = build_network(MINI)
     assert load_averaged(other, tmp_path, "second") is not None
-    for name in ("deeplab", "second_head"):
+    for name in ("others", "second_head"):
         own, kept = (getattr(one, name).state_dict() for one in (network, other))
         assert all(torch.equal(own[key].cpu(), kept[key]) for key in own)

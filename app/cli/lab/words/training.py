@@ -304,7 +304,7 @@ def _add_late(actions) -> None:
 
 def _add_second(actions) -> None:
     second = new_command(
-        actions, "second", "train what reads another network's maps, on labelled photos and rooms"
+        actions, "second", "train what reads other networks' maps, on labelled photos and rooms"
     )
     _add_labelled(second)
     second.add_argument(
@@ -313,8 +313,9 @@ def _add_second(actions) -> None:
     second.add_argument(
         "--weights",
         type=Path,
-        metavar="FILE",
-        help="DeepLab of 32 names on MobileNetV2, .tflite (default: the one in the weights file)",
+        nargs=2,
+        metavar=("DEEPLAB", "MOSAIC"),
+        help="DeepLab of 150 names on MobileNetV2, MOSAIC R4: .tflite (default: those of the weights file)",
     )
     _add_budget(second)
 
