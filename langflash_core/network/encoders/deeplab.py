@@ -17,7 +17,7 @@ from torch.nn import functional as F
 
 CHANNELS = 256
 """Of its last maps."""
-_LARGE = 10.0
+_LARGE = 1.5
 """What its last maps are on average where they are not 0; whoever learns from them gets numbers about 1."""
 _BLOCKS = (
     (1, 16, 1), (6, 24, 2), (6, 24, 1), (6, 32, 2), (6, 32, 1), (6, 32, 1), (6, 64, 2), (6, 64, 1),
