@@ -11,7 +11,7 @@ from typing import Any, TextIO
 from langflash_core.errors import InputError, WeightsError
 from langflash_core.extras import optional_packages
 from langflash_core.files import check_folder, check_output_file, readable_file
-from langflash_core.lab.labels.lite import read_others
+from langflash_core.lab.labels.lite import read_others, read_scores
 from langflash_core.lab.labels.opinions import LiteNetwork, write_opinions
 from langflash_core.lab.labels.outlines import write_outlines
 from langflash_core.lab.labels.prompted import PromptedSam
@@ -158,14 +158,14 @@ def _late(args: Namespace, out: TextIO) -> None:
 
 
 def _second(args: Namespace, out: TextIO) -> None:
-    folder, weights = _labelled(args), None
+    folder, weights, scores = _labelled(args), None, None
     if args.weights is not None:
         for path in args.weights:
             readable_file(path, "TensorFlow Lite network", WeightsError)
         with optional_packages():
-            weights = read_others(*args.weights)
+            weights, scores = read_others(*args.weights), read_scores(args.weights[0])
     with joined(args.device) as device:
-        state = run_second(_learned_from(args, folder, device), weights=weights)
+        state = run_second(_learned_from(args, folder, device), weights=weights, scores=scores)
         if leads():
             print(f"{args.output}: trained what reads the other networks, {state.step} steps", file=out)
 

@@ -11,10 +11,12 @@ from typing import Any
 
 import numpy as np
 import torch
+from jaxtyping import Float
 from torch import Tensor, nn
 
 from langflash_core.errors import InputError
-from langflash_core.network.encoders.deeplab import DeepLab
+from langflash_core.lab.labels.ade import NAMES
+from langflash_core.network.encoders.deeplab import CHANNELS, LARGE, DeepLab
 from langflash_core.network.encoders.mosaic import Mosaic
 
 _KINDS = ("CONV_2D", "DEPTHWISE_CONV_2D")
@@ -54,6 +56,23 @@ def read_others(deeplab: Path, mosaic: Path) -> dict[str, Tensor]:
     """
     both = {"deeplab": _tensors_of(deeplab, DeepLab()), "mosaic": _tensors_of(mosaic, Mosaic())}
     return {f"{name}.{key}": value for name, tensors in both.items() for key, value in tensors.items()}
+
+
+def read_scores(deeplab: Path) -> tuple[Float[Tensor, "N F"], Float[Tensor, " N"]]:
+    """Weight (N, F) and bias (N,), float32, of the layer that scores ADE20K's names (`ade.NAMES`) by the maps
+    that `DeepLab` gives.
+
+    Raises:
+        InputError: the file has no such layer.
+    """
+    shape = (len(NAMES), CHANNELS, 1, 1)
+    own = next((layer for layer in _convolutions(opened_lite(deeplab)) if layer.weight.shape == shape), None)
+    if own is None:
+        raise InputError(
+            f"{deeplab} does not score the {len(NAMES) - 1} names of ADE20K; NOTICE says which file does"
+        )
+    weight = torch.from_numpy(own.weight[:, :, 0, 0] * LARGE).float()
+    return weight, torch.from_numpy(own.bias).float()
 
 
 def _tensors_of(path: Path, network: nn.Module) -> dict[str, Tensor]:

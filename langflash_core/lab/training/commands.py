@@ -14,6 +14,7 @@ import torch
 from torch import Tensor
 
 from langflash_core.errors import InputError
+from langflash_core.lab.labels.ade import NAMES
 from langflash_core.lab.photos import PhotoFolder
 from langflash_core.lab.rooms import HELD_OUT_LIBRARIES, VALIDATION_LIBRARIES, RoomRenderer, load_pack
 from langflash_core.lab.saving import save_whole
@@ -39,6 +40,7 @@ from langflash_core.lab.training.pool import PhotoPool, PhotoSet
 from langflash_core.lab.training.real import JointSet, KeptPhotos, PhotoTargets, train_late
 from langflash_core.lab.training.recipes import Recipe, stages_of
 from langflash_core.lab.training.scenes import SceneSet, SceneSource
+from langflash_core.lab.training.second import Scored
 from langflash_core.lab.training.shards import Label
 from langflash_core.lab.training.stages.grouping import taught, untaught
 from langflash_core.lab.training.stages.stage import Stage, Words, guided
@@ -254,11 +256,17 @@ def run_late(given: PhotoRun, *, names: bool = False) -> LoopState:
     return train_late(network, targets, JointSet(live, rooms), words, given.run_dir, options, check)
 
 
-def run_second(given: PhotoRun, *, weights: Mapping[str, Tensor] | None = None) -> LoopState:
+def run_second(
+    given: PhotoRun,
+    *,
+    weights: Mapping[str, Tensor] | None = None,
+    scores: tuple[Tensor, Tensor] | None = None,
+) -> LoopState:
     """Train what reads the other networks' maps, on labelled photos and the cached rooms.
 
     Args:
-        weights: of the other networks (`OtherEyes`); None: those that the run begins with.
+        weights: of the other networks (`OtherEyes`); None: those that the run begins with. scores: weight and
+            bias of the layer that scores DeepLab's own names (`read_scores`), which then teach besides.
 
     Raises:
         InputError: no cache, no other networks, or a photo cannot be used.
@@ -273,7 +281,10 @@ def run_second(given: PhotoRun, *, weights: Mapping[str, Tensor] | None = None) 
     judged = (
         PhotoPool((PhotoSet.of(given.photos, given.kept, 1.0),), (0,), learned.bank) if given.kept else None
     )
-    return train_second(network, learned, judged, rooms, given.phrases(), given.run_dir, given.options)
+    scored = None if scores is None else Scored(*scores, given.encode(NAMES[1:]))
+    return train_second(
+        network, learned, judged, rooms, given.phrases(), given.run_dir, given.options, scored
+    )
 
 
 def _open(folder: Path, limit: int | None = None, *, photos: bool = False) -> RoomSet:

@@ -18,7 +18,7 @@ from langflash_core.lab.training.live import LivePhotos, pictures
 from langflash_core.lab.training.loop import LoopOptions, Optimising, train_stage
 from langflash_core.lab.training.pool import WHOLE, PhotoPool, PhotoSet, labelled_share
 from langflash_core.lab.training.real import MODULES, KeptPhotos, PhotoTargets
-from langflash_core.lab.training.second import KeptPixels, PixelSet, room_pixels, second_stage
+from langflash_core.lab.training.second import KeptPixels, PixelSet, Scored, room_pixels, second_stage
 from langflash_core.lab.training.stages.stage import Words, guided
 from langflash_core.lab.training.states import LoopState, save_cut
 from langflash_core.lab.training.words import PhraseSampler, PhraseTable
@@ -117,9 +117,10 @@ def train_second(
     table: PhraseTable,
     run_dir: Path,
     options: LoopOptions,
+    scored: Scored | None = None,
 ) -> LoopState:
     """Train what reads the other networks' maps, from nothing, judged by `kept`: `RUN/second.pt`. rooms: it
-    learns to tell them from photos.
+    learns to tell them from photos. scored: what DeepLab's own scores say teaches besides.
 
     Raises:
         InputError: a photo cannot be used, or they teach nothing.
@@ -135,7 +136,7 @@ def train_second(
     pixels.check()
     judge = None if kept is None else KeptPixels(PixelSet.of(net.others, kept, words.generator), photos.bank)
     # What phrases are compared with is true of no pixel.
-    stage = second_stage(photos.bank.denying(table.embeddings[table.baseline_rows()]))
+    stage = second_stage(photos.bank.denying(table.embeddings[table.baseline_rows()]), scored)
     return train_stage(net, stage, pixels, words, run_dir, options, judge)
 
 

@@ -4,9 +4,10 @@ Those networks stay as they are, so that their maps of every photo are found onc
 are drawn from them. One layer reads them and learns alone what they are called among the 37 classes and all
 names that the photos' sets have, and that none of them is "object", "things", "stuff" or "texture", which
 phrases are compared with. Whoever learned beside the first network, which knows the learned photos by heart,
-would be heard too little. Another layer learns to tell photos' pixels from those of rendered rooms, of which
-the others know nothing that the first does not. Every fourth photo is seen as small as rooms are, so that it
-is not sharpness that tells them apart.
+would be heard too little. What DeepLab's own scores say counts beside the labels: its 150 names are more
+than these photos show, and its odds say more than one name does. Another layer learns to tell photos' pixels
+from those of rendered rooms, of which the others know nothing that the first does not. Every fourth photo is
+seen as small as rooms are, so that it is not sharpness that tells them apart.
 
 Sizes: P pixels, F channels of the maps, V views.
 
@@ -27,7 +28,7 @@ from langflash_core.errors import InputError
 from langflash_core.lab.photos.fitting import fitted
 from langflash_core.lab.training.bank import MIN_PHOTOS, NameBank
 from langflash_core.lab.training.batches import RoomSet
-from langflash_core.lab.training.fewlabels import class_loss, name_loss
+from langflash_core.lab.training.fewlabels import TEMPERATURE, class_loss, name_loss
 from langflash_core.lab.training.live import SIZES
 from langflash_core.lab.training.measures import accuracy, confusion, mean_iou
 from langflash_core.lab.training.pool import WHOLE, PhotoPool, labelled_share
@@ -44,6 +45,8 @@ NAME = "second"
 MODULES = ("second_head", "others")
 NAMES = 0.5
 """What names count beside classes."""
+SCORED = 0.5
+"""What DeepLab's own names count beside classes."""
 PIXELS = 1500
 """Named pixels of a photo, at most."""
 PARTLY_PIXELS = 150
@@ -190,20 +193,39 @@ class KeptPixels:
         return {"classes_accuracy": accuracy(counts), "classes_miou": mean_iou(counts)}
 
 
-def second_stage(bank: NameBank) -> Stage:
+@dataclass(frozen=True)
+class Scored:
+    """What DeepLab's own last layer says: weight (N, D) and bias (N,) of its scores, of its maps alone, which
+    come first; the first score is for what has no name. texts (N - 1, C): unit vectors of the names."""
+
+    weight: Tensor
+    bias: Tensor
+    texts: Tensor
+
+    def loss(self, maps: Tensor, units: Tensor) -> Tensor:
+        """Cross-entropy of what vectors (P, C) answer among the names against its odds at maps (P, F)."""
+        weight, bias, texts = (part.to(maps.device) for part in (self.weight, self.bias, self.texts))
+        odds = (maps[:, : weight.shape[1]] @ weight.T + bias).softmax(-1)[:, 1:]
+        return -(odds * (TEMPERATURE * units @ texts.T).log_softmax(-1)).sum(1).mean()
+
+
+def second_stage(bank: NameBank, scored: Scored | None = None) -> Stage:
     """The layers that read the other networks, which themselves learn nothing."""
     return Stage(
         NAME, MODULES, (), {1: 1.0}, 8, 2e-3,
-        lambda network, batch, words: _loss(guided(network), batch, bank), rates={"others": 0.0},
+        lambda network, batch, words: _loss(guided(network), batch, bank, scored), rates={"others": 0.0},
     )  # fmt: skip
 
 
-def _loss(network: GuidedDepthNet, batch: PixelBatch, bank: NameBank) -> Loss:
+def _loss(network: GuidedDepthNet, batch: PixelBatch, bank: NameBank, scored: Scored | None) -> Loss:
     head, half = network.second_head, len(batch.classes) // 2
     units = head(batch.maps).float()
     by_class = class_loss(units[:half], batch.classes[:half], bank)
     by_name = name_loss(units[half:], batch.names[half:], batch.sets[half:], bank)
     total, told = by_class + NAMES * by_name, as_numbers(classes=by_class, names=by_name)
+    if scored is not None:
+        by_score = scored.loss(batch.maps, units)
+        total, told = total + SCORED * by_score, told | as_numbers(scored=by_score)
     if batch.rooms is None:
         return Loss(total, told)
     apart = _photo_loss(head.photo_odds(batch.maps).float(), head.photo_odds(batch.rooms).float())

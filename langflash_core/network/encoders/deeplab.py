@@ -17,7 +17,7 @@ from torch.nn import functional as F
 
 CHANNELS = 256
 """Of its last maps."""
-_LARGE = 1.5
+LARGE = 1.5
 """What its last maps are on average where they are not 0; whoever learns from them gets numbers about 1."""
 _BLOCKS = (
     (1, 16, 1), (6, 24, 2), (6, 24, 1), (6, 32, 2), (6, 32, 1), (6, 32, 1), (6, 64, 2), (6, 64, 1),
@@ -102,7 +102,7 @@ class DeepLab(nn.Module):
         whole = F.relu(self.whole(x.mean((2, 3), keepdim=True))).expand(-1, -1, *x.shape[-2:])
         deep = F.relu(self.both(torch.cat((whole, F.relu(self.near(x))), 1)))
         deep = F.interpolate(deep, (fine.shape[-2], fine.shape[-1]), mode="bilinear", align_corners=True)
-        return self.last(torch.cat((deep, fine), 1)) / _LARGE
+        return self.last(torch.cat((deep, fine), 1)) / LARGE
 
 
 def framed(x: Float[Tensor, "n C h w"], layer: nn.Conv2d) -> Float[Tensor, "n C _ _"]:

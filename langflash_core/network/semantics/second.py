@@ -19,9 +19,9 @@ from torch.nn import functional as F
 from langflash_core.network.encoders.others import CHANNELS, OtherEyes
 from langflash_core.network.presets import GuidedDepth
 
-COUNTS = 1.0
-"""What they count beside an atom, whose length is 1; what they say is as long as its pixels agree.
-More names photos hardly better (MEASURED.md)."""
+COUNTS = 1.5
+"""What they count beside an atom, whose length is 1; what they say is as long as its pixels agree
+(MEASURED.md)."""
 STEEPNESS = 10.0
 """Of what tells photos from rooms, so that it learns as fast as the words do: channels that tell them apart
 are many and faint."""

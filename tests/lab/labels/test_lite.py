@@ -7,8 +7,9 @@ import torch
 from ai_edge_litert import schema_py_generated as schema
 
 from langflash_core.errors import InputError
-from langflash_core.lab.labels.lite import read_others
-from langflash_core.network.encoders.deeplab import DeepLab
+from langflash_core.lab.labels.ade import NAMES
+from langflash_core.lab.labels.lite import read_others, read_scores
+from langflash_core.network.encoders.deeplab import CHANNELS, LARGE, DeepLab
 from langflash_core.network.encoders.mosaic import Mosaic
 from langflash_core.network.encoders.others import OtherEyes
 
@@ -144,9 +145,17 @@ def fill(layer: torch.nn.Conv2d, weights: np.ndarray, bias: np.ndarray) -> None:
         layer.bias.copy_(torch.from_numpy(bias))
 
 
-def written(path, network: torch.nn.Module, *, whole: bool, leave: str = "", more: bool = False):
+def written(
+    path,
+    network: torch.nn.Module,
+    *,
+    whole: bool,
+    leave: str = "",
+    more: bool = False,
+    last: torch.nn.Conv2d | None = None,
+):
     """A file of random weights, which the network then has; layers whose names begin with `leave` are not in
-    it; more: with one in its midst that the network has not."""
+    it; more: with one in its midst that the network has not; last: a layer behind it."""
     writer, random = Writer(), np.random.default_rng(0)
     put = writer.whole if whole else writer.mixed
     for name, layer in network.named_modules():
@@ -154,6 +163,8 @@ def written(path, network: torch.nn.Module, *, whole: bool, leave: str = "", mor
             put(layer, random)
         if more and name == "deep":
             put(torch.nn.Conv2d(64, 33, 1), random)
+    if last is not None:
+        put(last, random)
     writer.write(path)
     return network
 
@@ -174,6 +185,18 @@ def test_weights_are_found_in_the_order_of_layers(files):
     assert found.keys() == own.keys()
     for name, value in own.items():
         assert torch.equal(found[name], value), name
+
+
+def test_scores_of_names_are_found(files, tmp_path):
+    """Scores of what the file's own network gives are those of our maps, which are divided by `LARGE`."""
+    layer = torch.nn.Conv2d(CHANNELS, len(NAMES), 1)
+    written(tmp_path / "scores.tflite", DeepLab(), whole=False, last=layer)
+    weight, bias = read_scores(tmp_path / "scores.tflite")
+    torch.testing.assert_close(weight / LARGE, layer.weight[:, :, 0, 0], rtol=3e-7, atol=0)
+    assert torch.equal(bias, layer.bias)
+    assert len(set(NAMES)) == len(NAMES) == 151 and NAMES[1] == "wall" and NAMES[150] == "flag"
+    with pytest.raises(InputError, match="does not score the 150 names of ADE20K"):
+        read_scores(files[1])
 
 
 def test_another_network_is_refused(files, tmp_path):

@@ -14,6 +14,7 @@ from langflash_core.lab.training.second import (
     KeptPixels,
     PixelBatch,
     PixelSet,
+    Scored,
     room_pixels,
     second_stage,
 )
@@ -112,6 +113,21 @@ def test_photos_and_rooms_are_told_apart_and_what_is_denied_is_unsaid(network, l
     denied = (said @ nothing.T).amax(1)
     # Relevancy at 10 (LERF): more than e^2 to 1 against the nearest of what is true of nothing.
     assert float((own - denied > 0.2).float().mean()) > 0.75
+
+
+def test_what_scores_say_is_least_wrong_where_it_is_answered():
+    """Two names; the first map says the second one, 9 to 1 against the first and 3 to 1 against what has no
+    name. Cross-entropy by hand: odds of 1 and 9 in 13, and 16 times cosines of 1 and 0."""
+    texts = torch.eye(4)[:2]
+    weight = torch.tensor([[3.0, 1.0], [1.0, 1.0], [9.0, 1.0]]).log()  # rows: no name, first, second
+    scored = Scored(weight, torch.zeros(3), texts)
+    maps = torch.tensor([[1.0, 0.0, 5.0], [1.0, 0.0, -5.0]])  # behind DeepLab's are maps of others
+    right, wrong = (scored.loss(maps, texts[row].expand(2, -1)) for row in (1, 0))
+    other = 16 + torch.tensor(-16.0).exp().log1p()
+    mine = torch.tensor(-16.0).exp().log1p()
+    first, second = 1 / 13, 9 / 13
+    torch.testing.assert_close(right, second * mine + first * other, rtol=1e-5, atol=0)
+    torch.testing.assert_close(wrong, second * other + first * mine, rtol=1e-5, atol=0)
 
 
 def test_it_learns_and_a_run_keeps_it(learned, network, pixels, rooms, tmp_path):
