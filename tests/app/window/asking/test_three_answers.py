@@ -117,7 +117,7 @@ def test_a_chip_asks_its_word() -> None:
 
 def test_what_the_model_knows_is_what_its_card_says() -> None:
     card = asset_path("weights/mini_card.md").read_text()
-    assert "37 classes, atoms drawn" in card and ".367 / .724" in card and "72 %" in KNOWS
+    assert "37 classes, atoms drawn" in card and ".410 / .751" in card and "75 %" in KNOWS
 
 
 def test_one_photo_is_told_to_leave_depth_a_guess() -> None:
