@@ -192,8 +192,8 @@ def test_scores_of_names_are_found(files, tmp_path):
     layer = torch.nn.Conv2d(CHANNELS, len(NAMES), 1)
     written(tmp_path / "scores.tflite", DeepLab(), whole=False, last=layer)
     weight, bias = read_scores(tmp_path / "scores.tflite")
-    torch.testing.assert_close(weight / LARGE, layer.weight[:, :, 0, 0], rtol=3e-7, atol=0)
-    assert torch.equal(bias, layer.bias)
+    torch.testing.assert_close(weight / LARGE, layer.weight[:, :, 0, 0], rtol=3e-7, atol=0)  # rounded twice
+    assert layer.bias is not None and torch.equal(bias, layer.bias)
     assert len(set(NAMES)) == len(NAMES) == 151 and NAMES[1] == "wall" and NAMES[150] == "flag"
     with pytest.raises(InputError, match="does not score the 150 names of ADE20K"):
         read_scores(files[1])
