@@ -37,7 +37,7 @@ from langflash_core.scene.selection import strongest_atoms
 from langflash_core.scene.thin import covered_areas
 from langflash_core.types import Scene
 
-LANGUAGE, COLOUR, JUMP, ALONE = 1.0, 1.0, 1.0, 1.0
+LANGUAGE, COLOUR, JUMP, ALONE = 1.5, 1.0, 0.6, 1.0
 """What counts how much; colours in CIELAB over 100."""
 THING = (0.12, 0.20)
 """Heights between which the border of a thing is looked for. All numbers here were chosen on 12 held-out
@@ -125,6 +125,8 @@ class Regions:
 def regions_of(scene: Scene) -> Regions:
     """The tree of a scene. Linear in Gaussians and pixels of all grids."""
     nodes = _Nodes.of(scene)
+    if not len(nodes.atoms):
+        return Regions(nodes.own, np.zeros(0, int), np.zeros(0), np.zeros(0))
     first, second = nodes.pairs
     near = np.linalg.norm(nodes.colours[first] - nodes.colours[second], axis=1) < _SHADE
     same = near & (nodes.atoms[first] == nodes.atoms[second]) & (nodes.jumps < 0.5) & nodes.beside
@@ -175,7 +177,9 @@ class _Nodes:
         means = scene.gaussians.means.detach().cpu()
         finite = torch.isfinite(means).all(1).numpy() & (covered_areas(scene.gaussians) > 0)
         views = np.full(len(means), -1) if scene.view_ids is None else scene.view_ids.cpu().numpy()
-        shown = [_Grid.of(scene, view, finite & (views == view)) for view in np.unique(views[views >= 0])]
+        shown = [
+            _Grid.of(scene, view, finite & (views == view)) for view in np.unique(views[views >= 0]).tolist()
+        ]
         grids = [grid for grid in shown if len(grid.rows)]
         free = np.flatnonzero(finite & (views < 0))
         pixels = scene.view_size[0] * scene.view_size[1]
@@ -229,7 +233,7 @@ class _Grid:
         """Of some Gaussians, those in front of the camera and within its picture."""
         width, height = scene.view_size
         rows = np.flatnonzero(some)
-        viewmat, K = (values[int(view)].detach().cpu().double() for values in (scene.viewmats, scene.Ks))
+        viewmat, K = (values[view].detach().cpu().double() for values in (scene.viewmats, scene.Ks))
         points = scene.gaussians.means.detach().cpu()[torch.from_numpy(rows)].double().T.contiguous()
         x, y, z = (values.numpy() for values in pictured(viewmat, K, points))
         inside = (z > 1e-8) & (x >= -width) & (x < 2 * width) & (y >= -height) & (y < 2 * height)
@@ -244,12 +248,12 @@ class _Grid:
         known = (front >= 0).reshape(height, width)
         if not known.any():
             none = np.zeros((height, width), int)
-            return _Grid(int(view), rows, at, at, none - 1, none, none.astype(float), weights)
+            return _Grid(view, rows, at, at, none - 1, none, none.astype(float), weights)
         far, which = distance_transform_edt(~known, return_indices=True)
         nearest = which[0] * width + which[1]
         front = np.where(far <= _FILLED, front[nearest], -1)
         depths = depths[nearest]
-        return _Grid(int(view), rows, _settled(at, z, depths), at, front, nearest, depths, np.exp(weights))
+        return _Grid(view, rows, _settled(at, z, depths), at, front, nearest, depths, np.exp(weights))
 
     def colours(self, colours: Float[np.ndarray, "N 3"]) -> Float[np.ndarray, "n 3"]:
         """Mean colour of each pixel."""
@@ -366,7 +370,7 @@ class _Joining:
         count, atoms = int(leaves.max(initial=-1)) + 1, len(meaning)
         known = nodes.atoms >= 0
         places = leaves[known] * max(atoms, 1) + nodes.atoms[known]
-        shares = np.bincount(places, minlength=count * max(atoms, 1)).reshape(count, -1)[:, :atoms]
+        shares = np.bincount(places, minlength=count * max(atoms, 1)).reshape(count, max(atoms, 1))[:, :atoms]
         seen = np.zeros((count, int(nodes.views.max(initial=-1)) + 2), bool)
         seen[leaves, nodes.views] = True  # of no photo: the last
         first, second = (leaves[each] for each in nodes.pairs)
@@ -384,7 +388,7 @@ class _Joining:
             borders,
             jumps,
             overlaps,
-            [np.full(count, -1), np.zeros(count), sizes],
+            [np.full(count, -1), np.zeros(count), sizes.copy()],
         )
 
     def differences(self) -> Float[np.ndarray, " m"]:
@@ -392,7 +396,9 @@ class _Joining:
         first, second = self.ends
         norms = np.maximum(np.linalg.norm(self.meanings, axis=1), 1e-12)
         units, colours = self.meanings / norms[:, None], self.colours / self.weights[:, None]
+        known = norms > 1e-12  # of what means nothing nothing is known to be another thing
         language = 1 - np.einsum("mr,mr->m", units[first], units[second])
+        language *= known[first] & known[second]
         colour = np.linalg.norm(colours[first] - colours[second], axis=1)
         smaller = np.minimum(self.weights[first], self.weights[second])
         overlap = (self.overlaps / (2 * smaller)).clip(0, 1)
@@ -443,7 +449,7 @@ def _pairs(
     first, second = first[apart].astype(np.int64), second[apart].astype(np.int64)
     keys = np.minimum(first, second) * count + np.maximum(first, second)
     pairs, which = np.unique(keys, return_inverse=True)
-    sums = [np.bincount(which, each[apart], len(pairs)) for each in told]
+    sums = [np.bincount(which, each[apart], len(pairs)).astype(float) for each in told]
     low, high = np.divmod(pairs, max(count, 1))
     return (low, high), sums
 
