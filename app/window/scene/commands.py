@@ -456,7 +456,7 @@ class Merged:
         if not self.beyond or self.gone is None:
             return ""
         own = len(self.gone) - self.beyond
-        return f"{self.beyond:,} Gaussians along its edge were deleted with the {own:,} selected."
+        return f"{self.beyond:,} Gaussians behind it and along its edge went with the {own:,} selected."
 
     def fits(self, state: State) -> bool:
         """Whether it still holds the scene on show."""

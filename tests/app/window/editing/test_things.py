@@ -132,5 +132,5 @@ def test_what_filling_takes_beyond_the_selection_is_said(desk: Desk) -> None:
     desk.work()
     beyond = desk.state.editing.num_deleted - BLOCK
     (toast,) = [each for each in desk.state.toasts if "along its edge" in each.text]
-    assert toast.text == f"{beyond:,} Gaussians along its edge were deleted with the 2,500 selected."
+    assert toast.text == f"{beyond:,} Gaussians behind it and along its edge went with the 2,500 selected."
     assert 0 < beyond < BLOCK / 2
