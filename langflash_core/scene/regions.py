@@ -253,8 +253,9 @@ class _Grid:
         if not known.any():
             none = np.zeros((height, width), int)
             return _Grid(view, rows, at, at, none - 1, none, none.astype(float), weights)
-        far, which = distance_transform_edt(~known, return_indices=True)
+        which = np.asarray(distance_transform_edt(~known, return_distances=False, return_indices=True))
         nearest = which[0] * width + which[1]
+        far = np.hypot(*(which - np.indices(known.shape)))
         front = np.where(far <= _FILLED, front[nearest], -1)
         depths = depths[nearest]
         return _Grid(view, rows, _settled(at, z, depths), at, front, nearest, depths, np.exp(weights))
@@ -441,8 +442,8 @@ class _Joining:
         self.names, self.sizes, self.weights = self.names[kept], self.sizes[kept], self.weights[kept]
         self.colours, self.meanings, self.seen = self.colours[kept], self.meanings[kept], self.seen[kept]
         told = [self.borders, self.jumps, self.overlaps]
-        ends = (place[each] for each in self.ends)
-        self.ends, (self.borders, self.jumps, self.overlaps) = _pairs(*ends, told, len(self.sizes))
+        first, second = (place[each] for each in self.ends)
+        self.ends, (self.borders, self.jumps, self.overlaps) = _pairs(first, second, told, len(self.sizes))
 
 
 def _pairs(

@@ -59,12 +59,10 @@ def silhouette(
         scales = np.partition(scene.gaussians.scales.detach().cpu().numpy()[rows], 1, axis=1)
         wide = (scales[:, 1] / depths * K[0, 0]).clip(0, _WIDEST)
         inside = (z > NEAR) & (u >= 0) & (u < camera.width) & (v >= 0) & (v < camera.height)
-    own, places = part[rows][inside], (v[inside].astype(int), u[inside].astype(int))
-    steps = np.round(np.nan_to_num(wide[inside])).astype(int)
-    whole, some = (
-        _nearest(z[inside][rows_], *(each[rows_] for each in places), steps[rows_], none.shape)
-        for rows_ in (np.ones(len(own), bool), own)
-    )
+    lines, columns = v[inside].astype(int), u[inside].astype(int)
+    own, z, steps = part[rows][inside], z[inside], np.round(np.nan_to_num(wide[inside])).astype(int)
+    whole = _nearest(z, lines, columns, steps, none.shape)
+    some = _nearest(z[own], lines[own], columns[own], steps[own], none.shape)
     shown = np.isfinite(some) & (some <= _BESIDE * whole)
     closed = cv2.morphologyEx(shown.astype(np.uint8), cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8))
     return cv2.medianBlur(closed, 3) > 0

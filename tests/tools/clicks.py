@@ -15,6 +15,7 @@ from pathlib import Path
 import cv2
 import numpy as np
 import torch
+from PIL import Image
 
 from langflash_core.mending.looks import drawn, mattes
 from langflash_core.pipeline import reconstruct
@@ -123,12 +124,11 @@ def judged(
     camera, every, select = scene.camera(view, *size), np.ones(len(scene.gaussians), bool), chooser(scene)
     half, found = (size[0] // 2, size[1] // 2), {}
     for name, shape in shapes.items():
-        deep = cv2.distanceTransform(np.pad(mask_of(shape, frame, size), 1).astype(np.uint8), cv2.DIST_L2, 3)[
-            1:-1, 1:-1
-        ]
+        inside = np.pad(mask_of(shape, frame, size), 1).astype(np.uint8)
+        deep = cv2.distanceTransform(inside, cv2.DIST_L2, 3)[1:-1, 1:-1]
         lines, columns = np.indices(deep.shape)
         line, column = np.unravel_index(deep.argmax(), deep.shape)
-        pixels = (lines - line) ** 2 + (columns - column) ** 2 <= RADIUS**2
+        pixels = np.asarray(np.hypot(lines - line, columns - column) <= RADIUS)
         chosen, *others = select(seen_in(scene, every, camera, pixels))
         true, seen = mask_of(shape, frame, half), camera.resized(*half)
         matte = mattes(scene, torch.from_numpy(chosen), [seen], drawn)[0][0].numpy() > 0.5
@@ -155,7 +155,8 @@ def main() -> None:
     films = parser.parse_args().films
     for (film, number), shapes in FRAMES.items():
         files = [films / film / f"{each:04d}.png" for each in (number - 1, number, number + 1)]
-        frame = cv2.imread(str(files[1])).shape[1::-1]
+        with Image.open(files[1]) as opened:
+            frame = opened.size
         for name, values in judged(reconstruct(files), shapes, frame).items():
             tell(f"{film} {number} {name}: {values[0]:.2f} ({values[1]:.2f})\n")
             told.append(values)

@@ -63,7 +63,7 @@ def clicks(
     more = inside[np.random.default_rng(thing).choice(len(inside), POINTS - 1)]
     lines, columns = np.indices(deep.shape)
     for line, column in (np.unravel_index(deep.argmax(), deep.shape), *more):
-        yield view, (lines - line) ** 2 + (columns - column) ** 2 <= _RADIUS**2
+        yield view, np.asarray(np.hypot(lines - line, columns - column) <= _RADIUS)
 
 
 def own_pixels(scene: Scene) -> Float[np.ndarray, " N"]:

@@ -72,7 +72,7 @@ def _outline(state: State, look: Look, place: ImVec2) -> None:
     for points in outline.lines:
         path = [_on_screen(at, place) for at in points]
         for colour, wide in ((dark, 3.5), (line, 1.5)):
-            canvas.add_polyline(path, col=colour, thickness=look.px(wide), flags=imgui.ImDrawFlags_.closed)
+            canvas.add_polyline([*path], col=colour, thickness=look.px(wide), flags=imgui.ImDrawFlags_.closed)
 
 
 def _region(state: State, look: Look, place: ImVec2, size: ImVec2) -> None:

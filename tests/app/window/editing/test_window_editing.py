@@ -144,7 +144,7 @@ def test_a_click_takes_a_thing_with_a_line_around_it_and_the_wheel_less_of_it(pr
     assert len(less["edits"]) == len(state["edits"])
     program.xdotool("key", "bracketright")
     program.until(lambda s: s["selected"] == 2500, "all of it")
-    left, top, right, bottom = program.box("##level")
+    left, top, _, bottom = program.box("##level")
     program.xdotool("mousemove", str(left + 3), str((top + bottom) // 2), "sleep", "0.25", "click", "1")
     program.until(lambda s: s["level"] == [0, count], "the least of it")
     floor = WALL[0], TOP + DOWN * 8 // 10  # right of the photos
