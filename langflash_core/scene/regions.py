@@ -10,8 +10,9 @@ joined, again and again, that differ least, which makes a tree. Of regions a and
 is what they differ by: F what a region means, c its mean colour, j_ab the share of their common border along
 which depth jumps (where two photos show the same place it does not), o_ab the overlap of two that no photo
 shows side by side, s the smaller one's share of the photos that show it. A region's height is the difference
-that made it, and its border holds from there up to the height of the next one: a click takes, of the regions
-around it, the one whose border holds longest, as a ratio, within `THING`.
+that made it, and its border holds from there up to the height of the next one. Of the regions around it a
+click takes the one whose border holds longest, as a ratio, within `THING`; somewhat rather one of a single
+atom, and one that the next is much larger than.
 
 Pairs that are each other's nearest are joined at once, which gives the same tree as one pair after the other
 where no two come nearer to a third by being joined (Bruynooghe 1978), so nearly the same here.
@@ -40,8 +41,12 @@ from langflash_core.types import Scene
 LANGUAGE, COLOUR, JUMP, ALONE = 1.5, 1.0, 0.6, 1.0
 """What counts how much; colours in CIELAB over 100."""
 THING = (0.06, 0.30)
-"""Heights between which the border of a thing is looked for. All numbers here were chosen on 12 held-out
-rooms (seeds 900000200 to 211) beyond those that are judged."""
+"""Heights between which the border of a thing is looked for."""
+GROWTH, OF_ONE = 0.2, 0.15
+"""Powers of what tells a thing, beside how long its border holds: by how much the next region is larger, and
+how much of it is of the atom that was clicked. All numbers here were chosen on 12 held-out rooms (seeds
+900000200 to 211) beyond those that are judged; these and `THING` also on the things of `tests.tools.clicks`."""
+_MOST_GROWTH = 4.0
 _SIZE = 0.25
 _STEP = 0.03  # of the logarithm of depth from a pixel to the next, beyond twice the steps beside: a jump
 _SAME = 0.05  # of the logarithm of depth, within which two photos show the same place
@@ -72,12 +77,13 @@ class Reach:
 class Regions:
     """The tree. leaves: (N,) the region that each Gaussian is of, -1 of none. parents: (t,) what a region is
     part of, always a later one; -1 of none. heights: (t,), no less than those of its parts. sizes: (t,) sums
-    of shares of photos."""
+    of shares of photos. atoms: (k,) of the first regions, the leaves; -1 of none."""
 
     leaves: Integer[np.ndarray, " N"] = field(repr=False)
     parents: Integer[np.ndarray, " t"] = field(repr=False)
     heights: Float[np.ndarray, " t"] = field(repr=False)
     sizes: Float[np.ndarray, " t"] = field(repr=False)
+    atoms: Integer[np.ndarray, " k"] = field(repr=False)
 
     def around(self, seen: Bool[np.ndarray, " N"]) -> Reach | None:
         """What a click can mean that shows some Gaussians; None where they are of nothing.
@@ -93,24 +99,38 @@ class Regions:
             way.append(int(self.parents[way[-1]]))
         thing = self._thing(way)
         levels = self._levels(way, thing)
+        joins = np.append(self._steps(levels), len(levels))[self.leaves]
+        return Reach(joins, len(levels), levels.index(way[thing]))
+
+    def _steps(self, levels: list[int]) -> Integer[np.ndarray, " t"]:
+        """Of each region the first level that it is part of; as many as there are, of what is of none."""
         steps, parents = [len(levels)] * len(self.parents), self.parents.tolist()
         for step, region in enumerate(levels):
             steps[region] = step
         for region in range(levels[-1] - 1, -1, -1):  # parents come later
             above = steps[parents[region]] if parents[region] >= 0 else len(levels)
             steps[region] = above if above < steps[region] else steps[region]
-        joins = np.array([*steps, len(levels)])[self.leaves]
-        return Reach(joins, len(levels), levels.index(way[thing]))
+        return np.array(steps)
 
     def _thing(self, way: list[int]) -> int:
-        """Where on the way from a leaf up the border holds longest."""
+        """Which region of the way from a leaf up is a thing."""
         low, high = THING
-        heights = self.heights[way]
+        heights, sizes = self.heights[way], self.sizes[way]
         ends = np.append(heights[1:], np.inf)
         lives = np.minimum(ends, high) / np.maximum(heights, low)
-        large = self.sizes[way] >= _LEAST_THING
+        large = sizes >= _LEAST_THING
         lives[(heights > high) | (ends < low) | ~large] = 0.0
-        return int(lives.argmax() if lives.any() else large.argmax())
+        grows = np.minimum(np.append(sizes[1:] / sizes[:-1], 1.0), _MOST_GROWTH)
+        likely = lives * grows**GROWTH * self._alike(way) ** OF_ONE
+        return int(likely.argmax() if likely.any() else large.argmax())
+
+    def _alike(self, way: list[int]) -> Float[np.ndarray, " w"]:
+        """Shares of the regions of a way that are of its leaf's atom."""
+        leaves = len(self.atoms)
+        same = self.atoms == self.atoms[way[0]]
+        steps = self._steps(way)[:leaves]
+        own = np.bincount(steps[same], self.sizes[:leaves][same], len(way) + 1)[: len(way)]
+        return own.cumsum() / self.sizes[way]
 
     def _levels(self, way: list[int], thing: int) -> list[int]:
         """Regions of the way, the chosen one among them, each clearly larger than the one before."""
@@ -130,14 +150,15 @@ def regions_of(scene: Scene) -> Regions:
     """The tree of a scene. Linear in Gaussians and pixels of all grids."""
     nodes = _Nodes.of(scene)
     if not len(nodes.atoms):
-        return Regions(nodes.own, np.zeros(0, int), np.zeros(0), np.zeros(0))
+        return Regions(nodes.own, np.zeros(0, int), np.zeros(0), np.zeros(0), np.zeros(0, int))
     first, second = nodes.pairs
     near = np.linalg.norm(nodes.colours[first] - nodes.colours[second], axis=1) < _SHADE
     same = near & (nodes.atoms[first] == nodes.atoms[second]) & (nodes.jumps < 0.5) & nodes.beside
     leaves = _connected(first[same], second[same], len(nodes.atoms))
     tree = _Joining.of(nodes, leaves, _meaning(scene)).done()
-    at = np.append(leaves, -1)[nodes.own]
-    return Regions(at, *tree)
+    atoms = np.full(int(leaves.max()) + 1, -1)
+    atoms[leaves] = nodes.atoms
+    return Regions(np.append(leaves, -1)[nodes.own], *tree, atoms)
 
 
 def _connected(first: np.ndarray, second: np.ndarray, count: int) -> Integer[np.ndarray, " n"]:
