@@ -17,7 +17,7 @@ from langflash_core.types import Camera, Gaussians, Scene, Semantics
 from .compose import DEPTH, Nearness, shares
 from .contributions import composition, contributions
 from .mixing import mixing
-from .projection import ALPHA_MIN, Footprints, project, view_depths
+from .projection import ALPHA_MIN, DILATION, TAN_MARGIN, Footprints, project, view_depths
 
 SEEN = 0.05  # of a pixel's colour: a Gaussian that adds less anywhere in a region is not seen there
 
@@ -45,6 +45,8 @@ def seen_in(
         ValueError: the pixels are not of the camera's size.
     """
     near = None if through or not scene.layered else Nearness.of(scene)
+    if pixels.shape == (camera.height, camera.width):
+        visible = visible & _may_touch(scene.gaussians, camera, pixels)
     if near is not None and near.views and pixels.shape == (camera.height, camera.width):
         return _seen_in_layers(scene, near, visible, camera, pixels)
     rows, shown = _shown(scene.gaussians, visible)
@@ -52,6 +54,34 @@ def seen_in(
     found = np.zeros(len(visible), bool)
     found[rows[parts >= SEEN].numpy()] = True
     return found
+
+
+def _may_touch(
+    gaussians: Gaussians, camera: Camera, pixels: Bool[np.ndarray, "H W"]
+) -> Bool[np.ndarray, " N"]:
+    """(N,) bool: all whose footprints reach the box around some pixels, and few others.
+
+    A footprint's variance is at most (s f)^2 (1 + t^2) + e, s the longest axis over the depth, t the steepest
+    direction that `project` knows; it ends at sqrt(2 ln 255) deviations.
+    """
+    lines, columns = np.flatnonzero(pixels.any(1)), np.flatnonzero(pixels.any(0))
+    if not len(lines):
+        return np.zeros(len(gaussians), bool)
+    viewmat, K = camera.viewmat.cpu().double().numpy(), camera.K.cpu().double().numpy()
+    with np.errstate(all="ignore"):  # what is not finite touches nothing
+        x, y, z = viewmat[:3, :3] @ gaussians.means.cpu().numpy().T + viewmat[:3, 3:]
+        depths = 1.0 if camera.orthographic else np.maximum(z, 1e-9)
+        steep = 0.0
+        if not camera.orthographic:
+            size = np.array([camera.width, camera.height])
+            focal, middle = np.diag(K)[:2], K[:2, 2]
+            reach = np.maximum(middle, size - middle) / focal + TAN_MARGIN * 0.5 * size / focal
+            steep = float(reach @ reach)
+        wide = gaussians.scales.cpu().numpy().max(1) / depths * max(K[0, 0], K[1, 1])
+        far = np.sqrt(2 * np.log(1 / ALPHA_MIN)) * np.sqrt(wide**2 * (1 + steep) + DILATION) + 1.0
+        u, v = x / depths * K[0, 0] + K[0, 2], y / depths * K[1, 1] + K[1, 2]
+        across = (u >= columns[0] - far) & (u <= columns[-1] + 1 + far)
+        return across & (v >= lines[0] - far) & (v <= lines[-1] + 1 + far)
 
 
 def _seen_in_layers(

@@ -1,13 +1,15 @@
 """What a person points at: regions by the reference's own shares, pixels as the weight maps hold them."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import torch
 
-from langflash_core.splat import compose, render
+from langflash_core.splat import compose, picking, render
 from langflash_core.splat.picking import SEEN, seen_in, sights, weights_at
 from langflash_core.splat.reference import rasterize
-from tests.splat.scenes import camera, cloud
+from tests.splat.scenes import camera, cloud, parallel
 from tests.splat.test_compose import camera_at, layered
 
 
@@ -47,6 +49,28 @@ def test_nothing_shown_is_nothing_seen_and_weighs_nothing() -> None:
     scene, seen = cloud(20), camera()
     assert not seen_in(scene, np.zeros(20, bool), seen, box()).any()
     assert not weights_at(scene.semantics, sights(scene, np.zeros(20, bool), seen), 24, 20).any()
+
+
+@pytest.mark.parametrize("flat", [False, True])
+def test_what_cannot_touch_a_region_is_left_out_and_nothing_else(flat: bool, monkeypatch) -> None:
+    scene, seen = cloud(400, size=0.06), camera()
+    means = scene.gaussians.means.clone()
+    means[::50] = torch.nan
+    means[::7] -= torch.tensor([0.0, 0.0, 1.4])  # some close to the eye, some behind it
+    scene = replace(scene, gaussians=replace(scene.gaussians, means=means))
+    seen, visible, asked = parallel(seen) if flat else seen, np.ones(400, bool), 0
+    for line, column, side in ((0, 0, 3), (20, 24, 1), (36, 44, 4), (10, 5, 12)):
+        pixels = np.zeros((40, 48), bool)
+        pixels[line : line + side, column : column + side] = True
+        near = picking._may_touch(scene.gaussians, seen, pixels)
+        asked += int(near.sum())
+        for through in (False, True):
+            found = seen_in(scene, visible, seen, pixels, through=through)
+            with monkeypatch.context() as slowly:
+                slowly.setattr(picking, "_may_touch", lambda *_: visible)
+                assert (found == seen_in(scene, visible, seen, pixels, through=through)).all()
+    assert asked < 4 * 300, "few others"
+    assert not picking._may_touch(scene.gaussians, seen, np.zeros((40, 48), bool)).any()
 
 
 def test_a_pixel_of_layers_is_weighed_as_their_blend() -> None:

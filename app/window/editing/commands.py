@@ -44,7 +44,7 @@ class SelectRegion:
 
 @dataclass(frozen=True)
 class SelectThing:
-    """Find the thing that a pixel of the picture's place shows: what is of its group and touches it."""
+    """Find the thing that a pixel of the picture's place shows, its parts, and what it is part of."""
 
     at: Point
     combine: Combine = "replace"
@@ -110,11 +110,17 @@ class Found:
         marks = state.editing.marks
         if marks is None or self.mask.count != marks.deleted.count:
             return state
-        after = edits.select(marks, self.mask, self.combine)
-        changed = len(after.selected ^ marks.selected)
-        count = len(after.selected) if self.combine == "replace" else changed
-        verb = {"replace": "Select", "add": "Add", "remove": "Unselect"}[self.combine]
-        return with_edit(state, f"{verb} {count:,} {self.what}", after)
+        return selected(state, edits.select(marks, self.mask, self.combine), self.combine, self.what)
+
+
+def selected(state: State, after: Marks, combine: Combine, what: str) -> State:
+    """The state after a selection became another. what: how, for the list of edits."""
+    marks = state.editing.marks
+    assert marks is not None
+    changed = len(after.selected ^ marks.selected)
+    count = len(after.selected) if combine == "replace" else changed
+    verb = {"replace": "Select", "add": "Add", "remove": "Unselect"}[combine]
+    return with_edit(state, f"{verb} {count:,} {what}", after)
 
 
 @dataclass(frozen=True)

@@ -26,15 +26,17 @@ from .mending import (
     PickSource,
     RememberUnhidden,
 )
-from .pointing import CardOpened, Named, ReadingTaken, RulerPlaced
+from .pointing import CardOpened, Named, ReadingTaken, RulerPlaced, SetTool
 from .state import Reading, Tool
 from .teaching import WORDS, KeepWords, TakeWords
 from .work import (
+    DrawOutline,
     FindLessons,
     FindMargins,
     KeepLessons,
     NameAtoms,
     NamePlace,
+    PrepareThings,
     ScoreFloaters,
     Weigh,
     request_for,
@@ -48,6 +50,8 @@ class EditingEffects(Effects):
         self._hands = hands
         self._viewport = viewport
         self._read: tuple | None = None  # what the last reading under the pointer was of
+        self._seen: tuple | None = None  # selection and place of the last frame
+        self._lined: tuple | None = None  # of the last outline that was asked for
 
     # Every picture
 
@@ -77,6 +81,18 @@ class EditingEffects(Effects):
         self._read = key
         if editing.asked is not None and state.scene.pose == self._viewport.pose:
             self._ask(state, info)
+        self._outline(state, info)
+
+    def _outline(self, state: State, info: SceneInfo) -> None:
+        """Ask for the line around the selection once that, and the place, are those of the last frame."""
+        marks, pose, size = state.editing.marks, state.scene.pose, self._viewport.size
+        if marks is None or not marks.selected or min(size) < 1:
+            return
+        seen = (info.serial, marks.selected, marks.visible, marks.changes, pose, size)
+        if seen == self._seen and seen != self._lined:
+            self._lined = seen
+            self._hands.submit(DrawOutline(info.serial, info.memory, marks, pose, size))
+        self._seen = seen
 
     def _weigh(self, state: State, info: SceneInfo, reading: Reading) -> None:
         marks, size = state.editing.marks, self._viewport.size
@@ -115,6 +131,8 @@ class EditingEffects(Effects):
             case SceneArrived():
                 if info is not None and info.num_atoms and marks is not None:
                     self._hands.submit(NameAtoms(info.serial, info.memory, marks))
+            case SetTool(Tool.PICK) if info is not None and marks is not None:
+                self._hands.submit(PrepareThings(info.serial, info.memory, marks))
             case KeepWords() if info is not None and marks is not None:
                 self._hands.submit(KeepLessons(info.serial, info.memory, marks, config_folder() / WORDS))
             case TakeWords() if info is not None and marks is not None:

@@ -6,6 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
+from langflash_core.geometry.poses import Pose
 from langflash_core.mending.recipes import MARGIN, STRENGTH, Box, Recipe
 from langflash_core.scene.changes import Change
 from langflash_core.scene.edits import Combine, History, Marks
@@ -121,6 +122,33 @@ class Card:
 
 
 @dataclass(frozen=True)
+class Reached:
+    """What was clicked last: levels of it, the smallest first, and the one that is selected.
+
+    before, after: the history without and with that.
+    """
+
+    levels: tuple[Mask, ...] = field(repr=False)
+    level: int
+    combine: Combine
+    before: History = field(repr=False)
+    after: History = field(repr=False)
+
+
+@dataclass(frozen=True)
+class Outline:
+    """Closed lines around what the picture shows of a selection, framebuffer pixels of its place.
+
+    of: the selection. pose, size: where it is seen from, and of the picture's place.
+    """
+
+    lines: tuple[tuple[Point, ...], ...] = field(repr=False)
+    of: Mask = field(repr=False)
+    pose: Pose
+    size: tuple[int, int]
+
+
+@dataclass(frozen=True)
 class Floaters:
     """The preview of what a recipe takes away: floaters, sheets, flyaways and crumbs, and what rules say.
 
@@ -195,7 +223,8 @@ class Editing:
     gesture: a change of the selection that is shown and not made yet. tint: of it, while a colour is chosen.
     hiding: how the selection is to be hidden for good, while that is asked; margin: of the last time.
     recipe_path: where a clean-up's recipe was written or read last. source: of the clone brush, world; fit:
-    its copies are as fine as what is around them.
+    its copies are as fine as what is around them. clicked: what the last click on a thing found; outline: of
+    the selection, where it was drawn last.
     """
 
     history: History | None = None
@@ -222,6 +251,13 @@ class Editing:
     recipe_path: Path | None = None
     source: Spot | None = None
     fit: bool = False
+    clicked: Reached | None = None
+    outline: Outline | None = None
+
+    @property
+    def reached(self) -> Reached | None:
+        """What was clicked last, as long as nothing was edited since."""
+        return self.clicked if self.clicked is not None and self.clicked.after is self.history else None
 
     @property
     def marks(self) -> Marks | None:

@@ -35,12 +35,14 @@ from .commands import (
 )  # fmt: skip
 from .mending import MarginsFound
 from .pointing import AtomsNamed, Named, ReadingTaken
-from .state import BY_STRENGTH, PICK_RADIUS, Point, Reading, Region, strongest
+from .state import BY_STRENGTH, PICK_RADIUS, Outline, Point, Reading, Region, strongest
 from .teaching import WordsFound, with_kept
+from .things import Outlined, ThingFound
 
 if TYPE_CHECKING:
     from torch import Tensor
 
+    from langflash_core.scene.regions import Regions
     from langflash_core.types import Scene
 
 MOST_PIXELS = 120_000  # of a region; a larger one is looked at coarser, which takes seconds less
@@ -131,35 +133,53 @@ class AtPixel(Selection):
 
 @dataclass(frozen=True)
 class FindThing(AtPixel):
-    """What is of the group that the pixel shows, or of one that means the same, and hangs together with it in
-    space."""
+    """The thing that the pixel shows, its parts, and what it is part of; where none is known, what the pixel
+    shows."""
 
     def run(self, stopping: Asked) -> Iterator[Command]:
-        from langflash_core.scene.instances import things
-        from langflash_core.scene.selection import strongest_atoms
+        seen, visible = self.seen(), self.marks.visible
+        reach = regions_in(self.memory).around(seen)
+        if reach is None:
+            yield Found(Mask.of(seen), self.combine, "of a thing")
+            return
+        levels = tuple(Mask.of(reach.rows(level)) & visible for level in range(reach.count))
+        yield ThingFound(levels, reach.chosen, self.combine)
 
-        seen = self.seen()
-        heads = np.array([atom.into for atom in self.marks.atoms] + [-1])  # the last for "none"
-        groups = heads[strongest_atoms(self.scene.semantics)]
-        of_one = groups[seen] if seen.any() else groups[:0]
-        if len(of_one) and of_one.max() >= 0:
-            group = np.bincount(of_one[of_one >= 0]).argmax()
-            members = np.isin(groups, self._alike(int(group))) & self.marks.visible.rows()
-            numbers = things(self.placed(), members)
-            here = numbers[seen & (numbers > 0)]
-            if len(here):
-                seen = numbers == np.bincount(here).argmax()
-        yield Found(Mask.of(seen), self.combine, "of a thing")
 
-    def _alike(self, group: int) -> np.ndarray:
-        """The atoms that mean what this one means: a plant is often several groups."""
-        from torch.nn.functional import normalize
+@dataclass(frozen=True)
+class PrepareThings(EditErrand):
+    """What clicks can mean, before the first one: it takes seconds."""
 
-        from langflash_core.language.taught import ALIKE
+    newest_counts = True
 
-        unit = normalize(self.dictionary().float(), dim=-1)
-        alike = np.flatnonzero((unit @ unit[group]).numpy() >= ALIKE)
-        return np.union1d(alike, group)  # itself also where it is silent
+    def run(self, stopping: Asked) -> Iterator[Command]:
+        regions_in(self.memory)
+        return iter(())
+
+
+def regions_in(memory: SceneMemory) -> "Regions":
+    """The tree of a scene, as it came; slow when asked for the first time."""
+    from langflash_core.scene.regions import regions_of
+
+    return memory.answered("regions", (), lambda: regions_of(memory.scene))
+
+
+@dataclass(frozen=True)
+class DrawOutline(EditErrand):
+    """The line around what the picture's place, which has `size`, shows of the selection."""
+
+    newest_counts = True
+
+    pose: Pose
+    size: tuple[int, int]
+
+    def run(self, stopping: Asked) -> Iterator[Command]:
+        from langflash_core.splat.outlines import outlines
+
+        part, visible = self.marks.selected, self.marks.visible.rows()
+        found = outlines(self.placed(), visible, part.rows(), to_camera(self.pose, *self.size))
+        lines = tuple(tuple((float(x), float(y)) for x, y in line) for line in found)
+        yield Outlined(Outline(lines, part, self.pose, self.size))
 
 
 @dataclass(frozen=True)

@@ -20,7 +20,7 @@ from ..asking.prompt_sets import MOST_PROMPTS
 from ..dialogs import Dialog
 from ..editing import cleaning as clean
 from ..editing import commands as edit
-from ..editing import mending, placing
+from ..editing import mending, placing, things
 from ..editing import pointing as point
 from ..editing import teaching as teach
 from ..editing.state import Handle, Tool
@@ -332,15 +332,23 @@ def _tools() -> Iterable[Entry]:
         ("Scale the selection", "i", Handle.SCALE),
     ):  # fmt: skip
         yield Entry(name, group, _shown(placing.SetHandle(handle)), _plain(key))
-    yield Entry("A smaller brush", group, _brush(1 / BRUSH_STEP), _plain("left_bracket"), repeats=True)
-    yield Entry("A larger brush", group, _brush(BRUSH_STEP), _plain("right_bracket"), repeats=True)
+    less, more = _amount(1 / BRUSH_STEP, -1), _amount(BRUSH_STEP, 1)
+    yield Entry("A smaller brush, or less of a thing", group, less, _plain("left_bracket"), repeats=True)
+    yield Entry("A larger brush, or more of a thing", group, more, _plain("right_bracket"), repeats=True)
     yield Entry("Clean up", group, _shown(edit.FindFloaters()))
     yield Entry("Clean up: by rules, or outside a box", group, _shown(clean.ShowRules()))
     yield Entry("Clean up: load a recipe ...", group, _shown(do.ShowDialog(Dialog.LOAD_RECIPE)))
 
 
-def _brush(factor: float) -> Callable[[State], do.Command | None]:
-    return lambda s: point.SetRadius(s.editing.radius * factor) if s.scene.info is not None else None
+def _amount(factor: float, steps: int) -> Callable[[State], do.Command | None]:
+    """Of the thing that was clicked, or else of the brush."""
+
+    def make(state: State) -> do.Command | None:
+        if state.editing.tool is Tool.PICK and state.editing.reached is not None:
+            return things.StepLevel(steps)
+        return point.SetRadius(state.editing.radius * factor) if state.scene.info is not None else None
+
+    return make
 
 
 def _editing() -> Iterable[Entry]:

@@ -439,7 +439,7 @@ class MergeScene:
 class Merged:
     """The scene with number `serial`, of which there was so much, and another as one scene; or, where `gone`
     says what was taken away, what fills its hole, or stands for it but is not what is `denied`; or `copied`,
-    copies of what was selected, or laid over what is `gone`."""
+    copies of what was selected, or laid over what is `gone`. beyond: how much of `gone` was not selected."""
 
     serial: int
     there: tuple[int, int]
@@ -448,6 +448,15 @@ class Merged:
     gone: Mask | None = None
     copied: bool = False
     denied: str = ""
+    beyond: int = 0
+
+    @property
+    def said(self) -> str:
+        """What people should know of it, or nothing."""
+        if not self.beyond or self.gone is None:
+            return ""
+        own = len(self.gone) - self.beyond
+        return f"{self.beyond:,} Gaussians behind it and along its edge went with the {own:,} selected."
 
     def fits(self, state: State) -> bool:
         """Whether it still holds the scene on show."""

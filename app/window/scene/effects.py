@@ -147,7 +147,8 @@ class SceneEffects(Effects):
             case All(commands):
                 waited = commands
             case Merged(gone=gone) if gone is not None and command.fits(before):
-                waited = [command.arrival(before)]
+                told = [Notify(command.said, "info")] if command.said else []
+                waited = [command.arrival(before), *told]
             case Merged(copied=True) if command.fits(before):
                 waited = [command.arrival(before), SetHandle(Handle.MOVE)]
             case Merged() if command.fits(before):

@@ -55,7 +55,9 @@ class FillHole(Job):
         patch, rows = fill(shown, gone, render), np.zeros(marks.selected.count, bool)
         rows[np.flatnonzero(kept)] = gone.numpy()
         info = describe_scene(appended(there(own.scene, marks), patch), serial, own.name, own.path)
-        return Merged(own.serial, marks.there, info, own.name, Mask.of(rows))
+        taken = Mask.of(rows)
+        beyond = len(taken - marks.selected)
+        return Merged(own.serial, marks.there, info, own.name, taken, beyond=beyond)
 
 
 @dataclass(frozen=True)

@@ -1,4 +1,4 @@
-"""`langflash lab eval level`: how scenes stand, how large they are, what inventory and plan get right.
+"""`langflash lab eval level`: how scenes stand, how large they are, what inventory, plan and clicks get right.
 
 Rooms are drawn from their seeds, so up, metres, walls and every thing are known. A scene is made of a room's
 photos by the code as it is (or read from where an earlier run kept it). A Gaussian is of the true thing that
@@ -25,6 +25,7 @@ from langflash_core.files import make_folder
 from langflash_core.inventory import Inventory, Thing, inventory
 from langflash_core.inventory.plan import Plan, floor_plan
 from langflash_core.inventory.things import OPENINGS, STRUCTURE
+from langflash_core.lab.evaluation.clicks import judge_clicks
 from langflash_core.lab.evaluation.numbers import rounded
 from langflash_core.lab.rooms import (
     HELD_OUT_LIBRARIES,
@@ -134,7 +135,7 @@ def kept_scene(staged: StagedRoom, seed: int, keep: Path | None, networks: Netwo
 
 @torch.no_grad()
 def judge(seed: int, scene: Scene, staged: StagedRoom, *, things: bool = True) -> Judged:
-    """One room."""
+    """One room. things: also what is in it."""
     world = found_world(scene)
     unit = true_unit(scene, staged)
     numbers = judge_world(scene, world, unit, staged)
@@ -142,7 +143,10 @@ def judge(seed: int, scene: Scene, staged: StagedRoom, *, things: bool = True) -
         return Judged(seed, numbers)
     found = inventory(scene.with_record(world=world, metric_scale=unit))
     views = replace(staged.views, instances=seen_through(staged.views))
-    more, sizes = judge_things(found, replace(staged, views=views))
+    known = replace(staged, views=views)
+    more, sizes = judge_things(found, known)
+    clicked, own = true_things(known, SEEN), true_instances(scene, known)
+    more |= judge_clicks(scene, views.instances.astype(int), clicked, own)
     walls, seen = judge_walls(found, floor_plan(found), staged)
     return Judged(seed, numbers | more | seen, walls, sizes)
 
@@ -408,6 +412,10 @@ MEASURES = (
     ("Count error per kind", "count_error"),
     ("Sizes measured", "sizes_measured"),
     ("Width and height, median error", "size_error_median"),
+    ("One click on a thing: intersection over union", "click_iou"),
+    ("... over .5, share of clicks", "click_right"),
+    ("... the best level: intersection over union", "click_best_iou"),
+    ("... the best level over .5, share of clicks", "click_best_right"),
     ("Walls found", "walls_found"),
     ("Walls, median error of their distance", "wall_error_median"),
     ("Walls within 5 % of their distance", "wall_right"),

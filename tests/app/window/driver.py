@@ -20,6 +20,8 @@ def editing(now: Editing) -> dict:
     return {
         "tool": now.tool.name,
         "selected": now.num_selected,
+        "level": None if now.reached is None else [now.reached.level, len(now.reached.levels)],
+        "lines": _lines(now),
         "deleted": len(history.marks.deleted) if history else 0,
         "hiding": "" if now.hiding is None else now.hiding.how,
         "margin": None if now.hiding is None else now.hiding.margin,
@@ -40,6 +42,12 @@ def editing(now: Editing) -> dict:
         if preview is None or not preview.least or history is None
         else len(preview.mask(history.marks.visible)),
     }
+
+
+def _lines(now: Editing) -> int | None:
+    """How many lines are around what is selected; None: not known yet."""
+    fits = now.outline is not None and now.marks is not None and now.outline.of == now.marks.selected
+    return len(now.outline.lines) if fits and now.outline is not None else None
 
 
 def _hides(now: Editing) -> int | None:

@@ -9,6 +9,7 @@ import pytest
 
 from langflash_core.inventory import inventory
 from langflash_core.lab.evaluation import level
+from langflash_core.lab.evaluation.clicks import POINTS, clicks, judge_clicks, overlap, own_pixels
 from langflash_core.lab.evaluation.level import (
     judge,
     judge_things,
@@ -17,6 +18,8 @@ from langflash_core.lab.evaluation.level import (
     matched_things,
     seen_through,
     summary,
+    true_instances,
+    true_things,
     true_unit,
 )
 from langflash_core.level import found_world
@@ -93,3 +96,32 @@ def test_a_summary_and_its_table_hold_every_number(judged):
     assert json.dumps(found, allow_nan=False)
     table = level_markdown({"summary": found})
     assert "Up within 1 degree" in table and "| Rooms | 2 |" in table
+
+
+def test_clicks_on_a_true_scene_find_things_and_on_one_of_a_single_thing_none(scene, staged, judged):
+    numbers = judged.numbers
+    assert numbers["click_best_iou"] >= numbers["click_iou"] > 0.6
+    assert numbers["click_best_right"] >= numbers["click_right"] > 0.7
+    views = replace(staged.views, instances=seen_through(staged.views))
+    known = replace(staged, views=views)
+    things, own = true_things(known, level.SEEN), true_instances(scene, known)
+    shuffled = np.random.default_rng(0).permutation(own)  # nothing is where it was
+    wrong = judge_clicks(scene, views.instances.astype(int), things, shuffled)
+    assert wrong["click_right"] == 0 and wrong["click_best_iou"] < 0.4
+
+
+def test_a_click_looks_at_its_thing_alone_and_overlaps_are_shares_of_pixels(scene, staged):
+    instances = staged.views.instances.astype(int)
+    thing = true_things(staged, level.SEEN)[0]
+    points = list(clicks(instances, thing))
+    assert len(points) == POINTS
+    for view, pixels in points:
+        lines, columns = np.nonzero(pixels)
+        middle = round(lines.mean()), round(columns.mean())
+        assert instances[view][middle] == thing or min(middle) < 4  # cut off by the photo's border
+    masses, rows = own_pixels(scene), np.arange(len(scene.gaussians)) % 2 == 0
+    # A Gaussian a pixel, half of one wide, opaque to .9: .9 * .5^2 pixels, those seen aside a little more.
+    assert np.median(masses) == pytest.approx(0.9 * 0.25, rel=0.3)
+    assert overlap(rows, rows, masses) == 1 and overlap(rows, ~rows, masses) == 0
+    assert overlap(rows, np.ones_like(rows), masses) == pytest.approx(masses[rows].sum() / masses.sum())
+    assert math.isnan(overlap(rows & ~rows, rows & ~rows, masses))

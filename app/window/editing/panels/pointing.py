@@ -26,7 +26,9 @@ _SHOWN_WORDS = 5
 
 
 def draw_marks(state: State, look: Look, place: ImVec2, size: ImVec2) -> None:
-    """On the picture, in the present window: the region under way, and the place that was asked about."""
+    """On the picture, in the present window: the selection's outline, the region under way, and the place
+    that was asked about."""
+    _outline(state, look, place)
     _region(state, look, place, size)
     editing = state.editing
     if editing.tool is Tool.CLONE and editing.source is not None:
@@ -55,6 +57,22 @@ def draw(state: State, look: Look, place: ImVec2, size: ImVec2) -> list[do.Comma
 def _on_screen(at: Point, place: ImVec2) -> ImVec2:
     pixels = imgui.get_io().display_framebuffer_scale
     return ImVec2(place.x + at[0] / pixels.x, place.y + at[1] / pixels.y)
+
+
+def _outline(state: State, look: Look, place: ImVec2) -> None:
+    """The line around the selection, where the picture shows it as it was found."""
+    editing, marks = state.editing, state.editing.marks
+    outline = editing.outline
+    if outline is None or marks is None or editing.gesture is not None:
+        return
+    if outline.pose != state.scene.pose or outline.of != marks.selected:
+        return
+    canvas, line = imgui.get_window_draw_list(), widgets.u32(theme.SELECTED)
+    dark = widgets.u32(ImVec4(0, 0, 0, 0.6))
+    for points in outline.lines:
+        path = [_on_screen(at, place) for at in points]
+        for colour, wide in ((dark, 3.5), (line, 1.5)):
+            canvas.add_polyline([*path], col=colour, thickness=look.px(wide), flags=imgui.ImDrawFlags_.closed)
 
 
 def _region(state: State, look: Look, place: ImVec2, size: ImVec2) -> None:

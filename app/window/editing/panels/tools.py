@@ -13,9 +13,9 @@ from ...kit.look import Look
 from ...state import State
 from .. import cleaning as clean
 from .. import commands as edit
-from .. import mending, placing
+from .. import mending, placing, things
 from .. import pointing as point
-from ..state import RADIUS_RANGE, REACH_RANGE, Floaters, Hiding, Tool
+from ..state import RADIUS_RANGE, REACH_RANGE, Floaters, Hiding, Reached, Tool
 from . import placing as placing_bar
 
 _TOOLS = (
@@ -25,7 +25,11 @@ _TOOLS = (
     (Tool.LASSO, fa.ICON_FA_SIGNATURE, "Select with a lasso: draw around it, or click its corners  (L)"),
     (Tool.BRUSH, fa.ICON_FA_PAINTBRUSH, "Select with a brush  (B)\n[ and ] change its size"),
     (Tool.SPHERE, fa.ICON_FA_CIRCLE_DOT, "Select with a ball: drag out from its centre  (O)"),
-    (Tool.PICK, fa.ICON_FA_ARROW_POINTER, "Select the thing under a click  (C)"),
+    (
+        Tool.PICK,
+        fa.ICON_FA_ARROW_POINTER,
+        "Select the thing under a click  (C)\nShift adds, Ctrl removes; [ and ] take less or more",
+    ),
     (Tool.PLACE, fa.ICON_FA_CUBE, "Move, turn or scale the selection  (Y, U, I)"),
     (Tool.CLONE, fa.ICON_FA_STAMP, "Clone brush: copy one place over another  (Ctrl+B)"),
     (Tool.RULER, fa.ICON_FA_RULER, "Measure, and set the scale: click both ends  (T)"),
@@ -48,6 +52,7 @@ _VIEWS = 92.0  # that the viewpoints below it take
 _MARGIN = 12.0
 _TALL = 6.0  # height of what a selection can do in two lines, in lines of text
 _REACH = 104.0  # width of the slider of how far a selection grows
+_LEVELS = 130.0  # of that of how much of a thing is selected
 _GROWING = _REACH + 130.0  # and of the buttons before it
 _MARGIN_SLIDER = 116.0  # of how much around a part is hidden with it
 _PADDING = 10.0  # of a bar, left and right
@@ -240,10 +245,24 @@ def _selection(state: State, look: Look, right: float) -> list[do.Command]:
     imgui.push_style_var(imgui.StyleVar_.item_spacing, look.vec(4, 4))
     imgui.same_line(begin + imgui.calc_text_size(f"{count:,} selected").x + look.px(14))
     issued += _actions(right)
+    if editing.reached is not None:
+        issued += _levels(editing.reached, look, right)
     widgets.go_on(look.px(_GROWING), right, look.px(14))  # all of it
     issued += _growing(state, look)
     imgui.pop_style_var()
     return issued
+
+
+def _levels(reached: Reached, look: Look, right: float) -> list[do.Command]:
+    """Less and more of the thing that was clicked."""
+    last = len(reached.levels) - 1
+    if not last:
+        return []
+    width, text = look.px(_LEVELS), f"{reached.level + 1}/{last + 1}"
+    widgets.go_on(width, right, look.px(14))
+    tip = "Less or more: part, thing, group  ([ and ], or Ctrl+wheel)"
+    changed, level = widgets.slider("##level", reached.level, (0.0, float(last)), text, tip, width)
+    return [things.SetLevel(round(level))] if changed else []
 
 
 def _actions(right: float) -> list[do.Command]:

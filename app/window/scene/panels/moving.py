@@ -14,6 +14,8 @@ from langflash_core.geometry import poses
 from langflash_core.geometry.poses import Pose
 
 from ...commands import Command
+from ...editing import things
+from ...editing.state import Tool
 from ...kit import widgets
 from ...kit.look import Look
 from ...state import State
@@ -43,7 +45,10 @@ def draw(state: State, look: Look, corner: ImVec2, size: ImVec2) -> list[Command
     start = state.scene.pose
     pose, refused = _dragged(state, look, size)
     if imgui.is_item_hovered() and (io.mouse_wheel or io.mouse_wheel_h):
-        pose = _scrolled(pose, state, look, size)
+        if io.key_ctrl and state.editing.tool is Tool.PICK and state.editing.reached is not None:
+            issued.append(things.StepLevel(round(math.copysign(1, io.mouse_wheel))))
+        else:
+            pose = _scrolled(pose, state, look, size)
     pose = walked(state, pose)
     if refused:
         issued.append(camera.Pull(pose, refused / look.scale))

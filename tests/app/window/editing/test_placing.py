@@ -16,6 +16,7 @@ from app.window.editing import pointing as point
 from app.window.editing.panels.gizmo import projection_of, view_of
 from app.window.editing.placing import Adjust, BeginTint, EndGesture, Nudge, SetHandle, ShowTint
 from app.window.editing.state import Handle, Tint, Tool
+from app.window.editing.things import ThingFound
 from app.window.editing.work import FindThing
 from app.window.frame import table
 from app.window.scene import commands as show
@@ -159,7 +160,7 @@ def test_moved_things_are_found_where_they_are(chosen: State, info) -> None:
     size, focal = (224, 168), 0.5 * 224 / np.tan(np.radians(30))
     at = (112 + focal * (CHAIR[0] + 0.5) / (CHAIR[2] - 0.2), 84 + focal * CHAIR[1] / (CHAIR[2] - 0.2))
     (found,) = FindThing(1, info.memory, marks, at, made.scene.pose, size, "replace").run(lambda: False)
-    assert isinstance(found, edit.Found) and len(found.mask & BLOCK) == 2500
+    assert isinstance(found, ThingFound) and len(found.levels[found.chosen] & BLOCK) == 2500
     (weighed,) = WeighAtoms(1, info.scene, marks).run(lambda: False)
     assert isinstance(weighed, AtomsWeighed) and weighed.places[0] is not None
     assert weighed.places[0].x == pytest.approx(CHAIR[0] + 0.5, abs=0.05)

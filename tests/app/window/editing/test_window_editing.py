@@ -128,6 +128,32 @@ def test_what_is_deleted_is_not_found_until_it_is_back(program: Program) -> None
     assert program.state["gl_errors"] == []
 
 
+def test_a_click_takes_a_thing_with_a_line_around_it_and_the_wheel_less_of_it(program: Program) -> None:
+    press(program, "c", "PICK")
+    before = program.picture()
+    program.xdotool("mousemove", *map(str, CHAIR), "sleep", "0.25", "click", "1")
+    state = program.until(lambda s: s["selected"] == 2500 and s["lines"] == 1, "the chair and its line")
+    level, count = state["level"]
+    assert level > 0 and count > level, "its checks are parts of it"
+    program.until_changed(before, 0.5)
+    wheel = ("keydown", "ctrl", "click", "5", "keyup", "ctrl")
+    pose = state["pose"]
+    program.xdotool(*wheel)
+    less = program.until(lambda s: 0 < s["selected"] < 2500 and s["lines"] is not None, "less of it")
+    assert less["level"] == [level - 1, count] and less["pose"] == pose, "it is not zoomed"
+    assert len(less["edits"]) == len(state["edits"])
+    program.xdotool("key", "bracketright")
+    program.until(lambda s: s["selected"] == 2500, "all of it")
+    left, top, _, bottom = program.box("##level")
+    program.xdotool("mousemove", str(left + 3), str((top + bottom) // 2), "sleep", "0.25", "click", "1")
+    program.until(lambda s: s["level"] == [0, count], "the least of it")
+    floor = WALL[0], TOP + DOWN * 8 // 10  # right of the photos
+    program.xdotool("mousemove", *map(str, floor), "keydown", "shift", "sleep", "0.3", "click", "1")
+    program.xdotool("sleep", "0.3", "keyup", "shift")
+    more = program.until(lambda s: len(s["edits"]) == len(state["edits"]) + 1, "the floor beside it")
+    assert more["edits"][-1].startswith("Add ") and more["selected"] > 2000
+
+
 def test_what_is_this_and_find_similar(program: Program) -> None:
     press(program, "x", "POINT")
     move(program, CHAIR)

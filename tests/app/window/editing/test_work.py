@@ -11,6 +11,7 @@ from app.window.asking.commands import Calibrated, EditPrompt, SetThreshold
 from app.window.editing import commands as edit
 from app.window.editing import work
 from app.window.editing.state import Reading, Region
+from app.window.editing.things import ThingFound
 from app.window.requests import SceneErrand
 from app.window.scene.commands import SceneArrived
 from app.window.scene.work import describe_scene
@@ -169,7 +170,12 @@ def test_a_place_answers_to_its_new_name_with_the_score_of_a_phrase(info) -> Non
 
 
 def thing_at(info, at: tuple[float, float], marks=None) -> np.ndarray:
-    return result(work.FindThing(*scene_of(info, marks), at, info.views[0], SIZE, "replace")).mask.rows()
+    return chosen(result(work.FindThing(*scene_of(info, marks), at, info.views[0], SIZE, "replace")))
+
+
+def chosen(found: edit.Found | ThingFound) -> np.ndarray:
+    """(N,) bool: what a click selects."""
+    return (found.mask if isinstance(found, edit.Found) else found.levels[found.chosen]).rows()
 
 
 def test_a_click_takes_the_whole_thing(info) -> None:
@@ -230,7 +236,7 @@ def test_with_parallel_rays_a_region_a_ball_and_a_click_take_what_they_show(info
     brush = work.FindInRegion(*scene_of(info), Region((at,), radius=6.0), flat, SIZE, False, "replace")
     brushed = result(brush).mask.rows()
     assert brushed.any() and not brushed[CHAIRS:].any()  # the block's front alone
-    thing = result(work.FindThing(*scene_of(info), at, flat, SIZE, "replace")).mask.rows()
+    thing = chosen(result(work.FindThing(*scene_of(info), at, flat, SIZE, "replace")))
     assert thing[:CHAIRS].mean() > 0.99 and not thing[CHAIRS:].any()
     pixels = 20.0
     ball = result(work.FindInSphere(*scene_of(info), at, flat, SIZE, "replace", pixels)).mask.rows()

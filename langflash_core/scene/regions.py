@@ -1,0 +1,493 @@
+"""What a click can mean: a scene as a tree of regions, from parts over things to groups of things.
+
+Every photo is a grid of nodes, one a pixel; a Gaussian that no photo made is a node of its own. Nodes are
+neighbours side by side in their photo, or where two photos show the same place, or where they touch. Leaves
+are neighbours of one atom and one colour between which depth does not jump. Then those two regions are
+joined, again and again, that differ least, which makes a tree. Of regions a and b
+
+    (LANGUAGE (1 - cos(F_a, F_b)) + COLOUR |c_a - c_b| + JUMP j_ab + ALONE (1 - o_ab)) s^(1/4)
+
+is what they differ by: F what a region means, c its mean colour, j_ab the share of their common border along
+which depth jumps (where two photos show the same place it does not), o_ab the overlap of two that no photo
+shows side by side, s the smaller one's share of the photos that show it. A region's height is the difference
+that made it, and its border holds from there up to the height of the next one. Of the regions around it a
+click takes the one whose border holds longest, as a ratio, within `THING`; somewhat rather one of a single
+atom, and one that the next is much larger than.
+
+Pairs that are each other's nearest are joined at once, which gives the same tree as one pair after the other
+where no two come nearer to a third by being joined (Bruynooghe 1978), so nearly the same here.
+
+Sizes: N Gaussians, V photos, H W pixels of a grid, K atoms, n nodes, k regions, m pairs, t regions of a tree.
+"""
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+import cv2
+import numpy as np
+import torch
+from jaxtyping import Bool, Float, Integer
+from scipy.ndimage import distance_transform_edt
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+
+from langflash_core.geometry.cameras import invert_rigid, pictured, world_points
+from langflash_core.geometry.harmonics import SH_C0
+from langflash_core.scene.instances import touching
+from langflash_core.scene.selection import strongest_atoms
+from langflash_core.scene.thin import covered_areas
+from langflash_core.types import Scene
+
+LANGUAGE, COLOUR, JUMP, ALONE = 1.5, 1.0, 0.6, 1.0
+"""What counts how much; colours in CIELAB over 100."""
+THING = (0.06, 0.30)
+"""Heights between which the border of a thing is looked for."""
+GROWTH, OF_ONE = 0.2, 0.15
+"""Powers of what tells a thing, beside how long its border holds: by how much the next region is larger, and
+how much of it is of the atom that was clicked. All numbers here were chosen on 12 held-out rooms (seeds
+900000200 to 211) beyond those that are judged; these and `THING` also on the things of `tests.tools.clicks`."""
+_MOST_GROWTH = 4.0
+_SIZE = 0.25
+_STEP = 0.03  # of the logarithm of depth from a pixel to the next, beyond twice the steps beside: a jump
+_SAME = 0.05  # of the logarithm of depth, within which two photos show the same place
+_SHADE = 0.03  # of a colour, up to which neighbours are of one leaf
+_FILLED = 8  # pixels that a Gaussian may be away from a pixel that it stands for
+_PARTNERS = 4  # photos that each is compared with: what more of them show is joined by way of these
+_LEAST_OVERLAP = 0.1  # of the smaller of two regions, below which they do not meet
+_STEPS = 1.25  # times as large: the next level of a click
+_LEAST_THING = 0.0005  # of a photo: smaller regions are specks, unless someone asks for less
+_ALL = 0.9  # of the scene: a region so large is no group
+
+
+@dataclass(frozen=True)
+class Reach:
+    """What one click can mean. joins: (N,) the first level that each Gaussian is of, counted from 0, the
+    smallest; `count` of what is of none. chosen: the level that is one thing."""
+
+    joins: Integer[np.ndarray, " N"] = field(repr=False)
+    count: int
+    chosen: int
+
+    def rows(self, level: int) -> Bool[np.ndarray, " N"]:
+        """The Gaussians of a level."""
+        return self.joins <= min(max(level, 0), self.count - 1)
+
+
+@dataclass(frozen=True)
+class Regions:
+    """The tree. leaves: (N,) the region that each Gaussian is of, -1 of none. parents: (t,) what a region is
+    part of, always a later one; -1 of none. heights: (t,), no less than those of its parts. sizes: (t,) sums
+    of shares of photos. atoms: (k,) of the first regions, the leaves; -1 of none."""
+
+    leaves: Integer[np.ndarray, " N"] = field(repr=False)
+    parents: Integer[np.ndarray, " t"] = field(repr=False)
+    heights: Float[np.ndarray, " t"] = field(repr=False)
+    sizes: Float[np.ndarray, " t"] = field(repr=False)
+    atoms: Integer[np.ndarray, " k"] = field(repr=False)
+
+    def around(self, seen: Bool[np.ndarray, " N"]) -> Reach | None:
+        """What a click can mean that shows some Gaussians; None where they are of nothing.
+
+        Args:
+            seen: a few, most of them of what was meant.
+        """
+        own = self.leaves[seen & (self.leaves >= 0)]
+        if not len(own):
+            return None
+        way = [int(np.bincount(own).argmax())]
+        while self.parents[way[-1]] >= 0:
+            way.append(int(self.parents[way[-1]]))
+        thing = self._thing(way)
+        levels = self._levels(way, thing)
+        joins = np.append(self._steps(levels), len(levels))[self.leaves]
+        return Reach(joins, len(levels), levels.index(way[thing]))
+
+    def _steps(self, levels: list[int]) -> Integer[np.ndarray, " t"]:
+        """Of each region the first level that it is part of; as many as there are, of what is of none."""
+        steps, parents = [len(levels)] * len(self.parents), self.parents.tolist()
+        for step, region in enumerate(levels):
+            steps[region] = step
+        for region in range(levels[-1] - 1, -1, -1):  # parents come later
+            above = steps[parents[region]] if parents[region] >= 0 else len(levels)
+            steps[region] = above if above < steps[region] else steps[region]
+        return np.array(steps)
+
+    def _thing(self, way: list[int]) -> int:
+        """Which region of the way from a leaf up is a thing."""
+        low, high = THING
+        heights, sizes = self.heights[way], self.sizes[way]
+        ends = np.append(heights[1:], np.inf)
+        lives = np.minimum(ends, high) / np.maximum(heights, low)
+        large = sizes >= _LEAST_THING
+        lives[(heights > high) | (ends < low) | ~large] = 0.0
+        grows = np.minimum(np.append(sizes[1:] / sizes[:-1], 1.0), _MOST_GROWTH)
+        likely = lives * grows**GROWTH * self._alike(way) ** OF_ONE
+        return int(likely.argmax() if likely.any() else large.argmax())
+
+    def _alike(self, way: list[int]) -> Float[np.ndarray, " w"]:
+        """Shares of the regions of a way that are of its leaf's atom."""
+        leaves = len(self.atoms)
+        same = self.atoms == self.atoms[way[0]]
+        steps = self._steps(way)[:leaves]
+        own = np.bincount(steps[same], self.sizes[:leaves][same], len(way) + 1)[: len(way)]
+        return own.cumsum() / self.sizes[way]
+
+    def _levels(self, way: list[int], thing: int) -> list[int]:
+        """Regions of the way, the chosen one among them, each clearly larger than the one before."""
+        whole = self.sizes[self.parents < 0].sum()
+        levels = [way[thing]]
+        for region in reversed(way[:thing]):
+            if self.sizes[region] * _STEPS <= self.sizes[levels[0]]:
+                levels.insert(0, region)
+        for region in way[thing + 1 :]:
+            if _ALL * whole >= self.sizes[region] >= _STEPS * self.sizes[levels[-1]]:
+                levels.append(region)
+        return levels
+
+
+@torch.no_grad()
+def regions_of(scene: Scene) -> Regions:
+    """The tree of a scene. Linear in Gaussians and pixels of all grids."""
+    nodes = _Nodes.of(scene)
+    if not len(nodes.atoms):
+        return Regions(nodes.own, np.zeros(0, int), np.zeros(0), np.zeros(0), np.zeros(0, int))
+    first, second = nodes.pairs
+    near = np.linalg.norm(nodes.colours[first] - nodes.colours[second], axis=1) < _SHADE
+    same = near & (nodes.atoms[first] == nodes.atoms[second]) & (nodes.jumps < 0.5) & nodes.beside
+    leaves = _connected(first[same], second[same], len(nodes.atoms))
+    tree = _Joining.of(nodes, leaves, _meaning(scene)).done()
+    atoms = np.full(int(leaves.max()) + 1, -1)
+    atoms[leaves] = nodes.atoms
+    return Regions(np.append(leaves, -1)[nodes.own], *tree, atoms)
+
+
+def _connected(first: np.ndarray, second: np.ndarray, count: int) -> Integer[np.ndarray, " n"]:
+    """Numbers from 0 of what is connected by pairs."""
+    graph = coo_matrix((np.ones(len(first), bool), (first, second)), (count, count))
+    return connected_components(graph, directed=False)[1].astype(np.int64)
+
+
+def _meaning(scene: Scene) -> Float[np.ndarray, "K r"]:
+    """The dictionary in as few numbers as its atoms' cosines need."""
+    atoms = scene.semantics.dictionary.detach().cpu().double()
+    if not len(atoms):
+        return np.zeros((0, 0))
+    unit = torch.nn.functional.normalize(atoms, dim=-1)
+    values, vectors = torch.linalg.eigh(unit @ unit.T)
+    return (vectors * values.clamp_min(0).sqrt()).numpy()
+
+
+# Nodes
+
+
+@dataclass(frozen=True)
+class _Nodes:
+    """What regions are made of. atoms: (n,), -1 of none. colours: (n, 3) CIELAB / 100. views: (n,) the photo
+    whose pixel it is, -1 of none. shares: (n,) of it. own: (N,) the node of each Gaussian, -1 of none. pairs:
+    two of (m,), neighbours; jumps: (m,) 1 where depth jumps between them; beside: (m,) bool, in one photo or
+    in space; else two photos show the same place."""
+
+    atoms: Integer[np.ndarray, " n"]
+    colours: Float[np.ndarray, "n 3"]
+    views: Integer[np.ndarray, " n"]
+    shares: Float[np.ndarray, " n"]
+    own: Integer[np.ndarray, " N"]
+    pairs: tuple[Integer[np.ndarray, " m"], Integer[np.ndarray, " m"]]
+    jumps: Float[np.ndarray, " m"]
+    beside: Bool[np.ndarray, " m"]
+
+    @staticmethod
+    def of(scene: Scene) -> "_Nodes":
+        """Of a scene."""
+        means = scene.gaussians.means.detach().cpu()
+        finite = torch.isfinite(means).all(1).numpy() & (covered_areas(scene.gaussians) > 0)
+        views = np.full(len(means), -1) if scene.view_ids is None else scene.view_ids.cpu().numpy()
+        shown = [
+            _Grid.of(scene, view, finite & (views == view)) for view in np.unique(views[views >= 0]).tolist()
+        ]
+        grids = [grid for grid in shown if len(grid.rows)]
+        free = np.flatnonzero(finite & (views < 0))
+        pixels = scene.view_size[0] * scene.view_size[1]
+        start = len(grids) * pixels
+        own = np.full(len(means), -1)
+        for number, grid in enumerate(grids):
+            own[grid.rows] = number * pixels + grid.pixels
+        own[free] = start + np.arange(len(free))
+        atoms, colours = strongest_atoms(scene.semantics), _lab(scene)
+        front = np.concatenate([*(grid.front.ravel() for grid in grids), free]).astype(np.int64)
+        areas = covered_areas(scene.gaussians)[free]
+        links = [*_within(grids, pixels), *_across(scene, grids, pixels), _free(scene, free, start)]
+        first, second, jumps, beside = (np.concatenate(each) for each in zip(*links, strict=True))
+        return _Nodes(
+            np.where(front >= 0, np.append(atoms, -1)[front], -1),
+            np.concatenate([*(grid.colours(colours) for grid in grids), colours[free]]),
+            np.append(np.repeat([grid.view for grid in grids], pixels), np.full(len(free), -1)).astype(int),
+            np.append(np.full(start, 1 / pixels), areas / max(float(areas.sum()), 1e-30)),
+            own,
+            (first, second),
+            jumps,
+            beside,
+        )
+
+
+def _lab(scene: Scene) -> Float[np.ndarray, "N 3"]:
+    """Colours of Gaussians, CIELAB / 100."""
+    rgb = (0.5 + SH_C0 * scene.gaussians.sh[:, 0].detach().cpu()).nan_to_num(0).clamp(0, 1).numpy()
+    if not len(rgb):
+        return np.zeros((0, 3))
+    return cv2.cvtColor(rgb[None].astype(np.float32), cv2.COLOR_RGB2LAB)[0].astype(float) / 100
+
+
+@dataclass(frozen=True)
+class _Grid:
+    """One photo. rows: (r,) of its Gaussians. pixels: (r,) that each is of. front: (H, W) the largest one of
+    each pixel or the nearest one beside, -1 where none is near. depths: (H, W) logarithms. weights: (r,) of
+    colours. at: (r,) the pixel that each lies in."""
+
+    view: int
+    rows: Integer[np.ndarray, " r"]
+    pixels: Integer[np.ndarray, " r"]
+    at: Integer[np.ndarray, " r"]
+    front: Integer[np.ndarray, "H W"]
+    nearest: Integer[np.ndarray, "H W"]
+    depths: Float[np.ndarray, "H W"]
+    weights: Float[np.ndarray, " r"]
+
+    @staticmethod
+    def of(scene: Scene, view: int, some: Bool[np.ndarray, " N"]) -> "_Grid":
+        """Of some Gaussians, those in front of the camera and within its picture."""
+        width, height = scene.view_size
+        rows = np.flatnonzero(some)
+        viewmat, K = (values[view].detach().cpu().double() for values in (scene.viewmats, scene.Ks))
+        points = scene.gaussians.means.detach().cpu()[torch.from_numpy(rows)].double().T.contiguous()
+        x, y, z = (values.numpy() for values in pictured(viewmat, K, points))
+        inside = (z > 1e-8) & (x >= -width) & (x < 2 * width) & (y >= -height) & (y < 2 * height)
+        rows, z = rows[inside], np.log(z[inside])
+        at = y[inside].clip(0, height - 1).astype(int) * width + x[inside].clip(0, width - 1).astype(int)
+        weights = np.log(np.maximum(covered_areas(scene.gaussians)[rows], 1e-30)) - 2 * z
+        front, depths = np.full(width * height, -1), np.zeros(width * height)
+        order = np.argsort(weights, kind="stable")  # of several in a pixel the largest stays
+        front[at[order]] = rows[order]
+        order = np.argsort(-z, kind="stable")  # and the nearest one's depth
+        depths[at[order]] = z[order]
+        known = (front >= 0).reshape(height, width)
+        if not known.any():
+            none = np.zeros((height, width), int)
+            return _Grid(view, rows, at, at, none - 1, none, none.astype(float), weights)
+        which = np.asarray(distance_transform_edt(~known, return_distances=False, return_indices=True))
+        nearest = which[0] * width + which[1]
+        far = np.hypot(*(which - np.indices(known.shape)))
+        front = np.where(far <= _FILLED, front[nearest], -1)
+        depths = depths[nearest]
+        return _Grid(view, rows, _settled(at, z, depths), at, front, nearest, depths, np.exp(weights))
+
+    def colours(self, colours: Float[np.ndarray, "N 3"]) -> Float[np.ndarray, "n 3"]:
+        """Mean colour of each pixel."""
+        count = self.front.size
+        sums = np.stack([np.bincount(self.at, self.weights * c, count) for c in colours[self.rows].T], 1)
+        means = sums / np.maximum(np.bincount(self.at, self.weights, count), 1e-30)[:, None]
+        return means[self.nearest.ravel()]
+
+
+def _settled(
+    at: Integer[np.ndarray, " r"], z: Float[np.ndarray, " r"], depths: Float[np.ndarray, "H W"]
+) -> Integer[np.ndarray, " r"]:
+    """The pixels that Gaussians are of: their own, or the one beside it whose depth is theirs, where a jump
+    goes through it."""
+    height, width = depths.shape
+    flat, pixels = depths.ravel(), at.copy()
+    off = np.flatnonzero(np.abs(z - flat[at]) > _STEP)
+    lines, columns = np.divmod(at[off], width)
+    best = np.abs(z[off] - flat[at[off]])
+    for down in (-1, 0, 1):
+        for right in (-1, 0, 1):
+            there = (lines + down).clip(0, height - 1) * width + (columns + right).clip(0, width - 1)
+            apart = np.abs(z[off] - flat[there])
+            nearer = apart < best
+            pixels[off[nearer]], best[nearer] = there[nearer], apart[nearer]
+    return pixels
+
+
+_Links = tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]
+
+
+def _within(grids: list[_Grid], pixels: int) -> Iterator[_Links]:
+    """Neighbours in one photo. Depth jumps by a step that those on both sides of it do not have."""
+    for number, grid in enumerate(grids):
+        ids = number * pixels + np.arange(pixels).reshape(grid.front.shape)
+        for lines in (True, False):
+            depths, places, there = (
+                (each if lines else each.T) for each in (grid.depths, ids, grid.front >= 0)
+            )
+            steps = np.abs(np.diff(depths, axis=0))
+            if not steps.size:
+                continue
+            beside = np.minimum(np.vstack((steps[:1], steps[:-1])), np.vstack((steps[1:], steps[-1:])))
+            jumps = ((steps - 2 * beside) / _STEP).clip(0, 1)
+            both = there[1:] & there[:-1]
+            yield places[:-1][both], places[1:][both], jumps[both], np.ones(int(both.sum()), bool)
+
+
+def _across(scene: Scene, grids: list[_Grid], pixels: int) -> Iterator[_Links]:
+    """Pixels of two photos that show the same place."""
+    poses = invert_rigid(scene.viewmats.detach().cpu().double()).numpy()
+    for number, grid in enumerate(grids):
+        apart = [_apart(poses[grid.view], poses[other.view]) for other in grids]
+        partners = [other for other in np.argsort(apart, kind="stable") if other != number]
+        for other in partners[:_PARTNERS]:
+            pair = number * pixels, other * pixels
+            here, there = _same_places(scene, grid, grids[other])
+            yield pair[0] + here, pair[1] + there, np.zeros(len(here)), np.zeros(len(here), bool)
+
+
+def _apart(first: Float[np.ndarray, "4 4"], second: Float[np.ndarray, "4 4"]) -> float:
+    """How far two cameras are from each other, a scene unit as much as an angle of one."""
+    return float(np.linalg.norm(first[:3, 3] - second[:3, 3]) + np.linalg.norm(first[:3, 2] - second[:3, 2]))
+
+
+def _same_places(scene: Scene, grid: _Grid, other: _Grid) -> tuple[np.ndarray, np.ndarray]:
+    """Pixels of one photo, and those of another that show the same places."""
+    mats, Ks = (values.detach().cpu().double() for values in (scene.viewmats, scene.Ks))
+    depths = torch.from_numpy(np.exp(grid.depths))[None]
+    points = world_points(depths, mats[grid.view][None], Ks[grid.view][None])[0].reshape(-1, 3).T
+    x, y, z = (values.numpy() for values in pictured(mats[other.view], Ks[other.view], points.contiguous()))
+    height, width = other.front.shape
+    inside = (z > 1e-8) & (x >= 0) & (x < width) & (y >= 0) & (y < height) & (grid.front.ravel() >= 0)
+    there = np.where(inside, np.floor(y) * width + np.floor(x), 0).astype(int)
+    same = np.abs(np.log(np.where(inside, z, 1.0)) - other.depths.ravel()[there]) <= _SAME
+    same &= inside & (other.front.ravel()[there] >= 0)
+    return np.flatnonzero(same), there[same]
+
+
+def _free(scene: Scene, free: Integer[np.ndarray, " f"], start: int) -> _Links:
+    """Gaussians that no photo made, and touch."""
+    some = torch.from_numpy(free)
+    first, second = touching(scene.gaussians.map(lambda values: values[some]))
+    once = first < second
+    count = int(once.sum())
+    return start + first[once], start + second[once], np.zeros(count), np.ones(count, bool)
+
+
+# The tree
+
+
+@dataclass
+class _Joining:
+    """Regions while they are joined. names: (k,) their numbers in the tree. sizes: (k,) sums of shares.
+    seen: (k, V + 1) by which photos. colours (k, 3), meanings (k, r): sums. ends: of pairs (m,); borders,
+    jumps, overlaps: (m,) how long their border is, how much of it is a jump, and how many pixels of two
+    photos they share."""
+
+    names: Integer[np.ndarray, " k"]
+    sizes: Float[np.ndarray, " k"]
+    seen: Bool[np.ndarray, "k _"]
+    colours: Float[np.ndarray, "k 3"]
+    meanings: Float[np.ndarray, "k r"]
+    weights: Float[np.ndarray, " k"]
+    ends: tuple[np.ndarray, np.ndarray]
+    borders: Float[np.ndarray, " m"]
+    jumps: Float[np.ndarray, " m"]
+    overlaps: Float[np.ndarray, " m"]
+    tree: list[np.ndarray]
+
+    @staticmethod
+    def of(nodes: _Nodes, leaves: Integer[np.ndarray, " n"], meaning: Float[np.ndarray, "K r"]) -> "_Joining":
+        """Of leaves."""
+        count, atoms = int(leaves.max(initial=-1)) + 1, len(meaning)
+        known = nodes.atoms >= 0
+        places = leaves[known] * max(atoms, 1) + nodes.atoms[known]
+        shares = np.bincount(places, minlength=count * max(atoms, 1)).reshape(count, max(atoms, 1))[:, :atoms]
+        seen = np.zeros((count, int(nodes.views.max(initial=-1)) + 2), bool)
+        seen[leaves, nodes.views] = True  # of no photo: the last
+        first, second = (leaves[each] for each in nodes.pairs)
+        told = [nodes.beside.astype(float), nodes.jumps * nodes.beside, (~nodes.beside).astype(float)]
+        ends, (borders, jumps, overlaps) = _pairs(first, second, told, count)
+        sizes = np.bincount(leaves, nodes.shares, count)
+        return _Joining(
+            np.arange(count),
+            sizes,
+            seen,
+            np.stack([np.bincount(leaves, c, count) for c in nodes.colours.T], 1),
+            shares @ meaning,
+            np.bincount(leaves, minlength=count).astype(float),
+            ends,
+            borders,
+            jumps,
+            overlaps,
+            [np.full(count, -1), np.zeros(count), sizes.copy()],
+        )
+
+    def differences(self) -> Float[np.ndarray, " m"]:
+        """Of pairs; infinite where they do not meet."""
+        first, second = self.ends
+        norms = np.maximum(np.linalg.norm(self.meanings, axis=1), 1e-12)
+        units, colours = self.meanings / norms[:, None], self.colours / self.weights[:, None]
+        known = norms > 1e-12  # of what means nothing nothing is known to be another thing
+        language = 1 - np.einsum("mr,mr->m", units[first], units[second])
+        language *= known[first] & known[second]
+        colour = np.linalg.norm(colours[first] - colours[second], axis=1)
+        smaller = np.minimum(self.weights[first], self.weights[second])
+        overlap = (self.overlaps / (2 * smaller)).clip(0, 1)
+        side = self.borders > 0
+        jump = np.where(side, self.jumps / np.maximum(self.borders + self.overlaps, 1e-9), 0.0)
+        shares = self.sizes / self.seen.sum(1)
+        total = LANGUAGE * language + COLOUR * colour + JUMP * jump + ALONE * np.where(side, 0, 1 - overlap)
+        total *= np.minimum(shares[first], shares[second]) ** _SIZE
+        return np.where(side | (overlap >= _LEAST_OVERLAP), total, np.inf)
+
+    def done(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Parents, heights and sizes of the tree."""
+        while len(self.borders):
+            differences = self.differences()
+            pairs = _mutual(self.ends, differences, len(self.sizes))
+            if not len(pairs):
+                break
+            self._join(self.ends[0][pairs], self.ends[1][pairs], differences[pairs])
+        parents, heights, sizes = self.tree
+        return parents, heights, sizes
+
+    def _join(self, first: np.ndarray, second: np.ndarray, differences: np.ndarray) -> None:
+        """Make one region of each pair; no region is in two of them."""
+        parents, heights, _ = self.tree
+        new = len(parents) + np.arange(len(first))
+        parents[self.names[first]] = parents[self.names[second]] = new
+        parts = np.maximum(heights[self.names[first]], heights[self.names[second]])
+        for values in (self.sizes, self.colours, self.meanings, self.weights, self.seen):
+            values[first] += values[second]
+        made = np.full(len(new), -1), np.maximum(differences, parts), self.sizes[first]
+        self.tree = [np.append(old, own) for old, own in zip(self.tree, made, strict=True)]
+        self.names[first] = new
+        into, kept = np.arange(len(self.sizes)), np.ones(len(self.sizes), bool)
+        into[second], kept[second] = first, False
+        place = (kept.cumsum() - 1)[into]
+        self.names, self.sizes, self.weights = self.names[kept], self.sizes[kept], self.weights[kept]
+        self.colours, self.meanings, self.seen = self.colours[kept], self.meanings[kept], self.seen[kept]
+        told = [self.borders, self.jumps, self.overlaps]
+        first, second = (place[each] for each in self.ends)
+        self.ends, (self.borders, self.jumps, self.overlaps) = _pairs(first, second, told, len(self.sizes))
+
+
+def _pairs(
+    first: np.ndarray, second: np.ndarray, told: list[np.ndarray], count: int
+) -> tuple[tuple[np.ndarray, np.ndarray], list[np.ndarray]]:
+    """Each pair of two regions once, the lower number first, and the sums of what is told of it."""
+    apart = first != second
+    first, second = first[apart].astype(np.int64), second[apart].astype(np.int64)
+    keys = np.minimum(first, second) * count + np.maximum(first, second)
+    pairs, which = np.unique(keys, return_inverse=True)
+    sums = [np.bincount(which, each[apart], len(pairs)).astype(float) for each in told]
+    low, high = np.divmod(pairs, max(count, 1))
+    return (low, high), sums
+
+
+def _mutual(
+    ends: tuple[np.ndarray, np.ndarray], differences: Float[np.ndarray, " m"], count: int
+) -> Integer[np.ndarray, " p"]:
+    """Pairs of regions that are each other's nearest; of several equally near ones the first."""
+    order = np.argsort(differences, kind="stable")
+    order = order[np.isfinite(differences[order])]
+    place = np.arange(len(order))
+    nearest = np.full(count, len(order))
+    for each in ends:
+        np.minimum.at(nearest, each[order], place)
+    return order[(nearest[ends[0][order]] == place) & (nearest[ends[1][order]] == place)]
