@@ -19,8 +19,9 @@ from langflash_core.detail import Detail
 from langflash_core.geometry.cameras import invert_rigid
 from langflash_core.geometry.harmonics import colour_to_sh, sh_to_colour
 from langflash_core.images.views import source_picture, source_size
+from langflash_core.rig.rig import Rig
 from langflash_core.running import Progress
-from langflash_core.scene.assemble import placed_views
+from langflash_core.scene.assemble import placed_views, rig_of
 from langflash_core.scene.detailed import assemble_detailed, working_photo, working_size
 from langflash_core.scene.light import Light, photo_light
 from langflash_core.scene.prune import prune
@@ -77,13 +78,13 @@ def covered_scene(
     start = time.perf_counter()
     progress("light", 0.0)
     prediction, views = placed_views(prediction, views)
-    light = photo_light(
-        views.images, prediction.depths, prediction.confidences, prediction.viewmats, views.Ks
-    )
+    rig = rig_of(prediction, views)
+    light = photo_light(rig)
     grid = (views.images.shape[-2], views.images.shape[-1])
     photos, whole = _Photos(views, light, grid), _Photos(views, light.whole, grid)
     views = replace(views, images=light.corrected(views.images).clamp(0, 1))
-    left = strangers(views.images, prediction.depths, prediction.viewmats, views.Ks)
+    rig = rig_of(prediction, views)  # in the light of all
+    left = strangers(rig)
     bare = left | (False if gaussians else ~_with_layers(prediction)[:, None, None])
     scene = assemble_detailed(
         prediction,
@@ -95,7 +96,7 @@ def covered_scene(
         preset=preset,
         progress=lambda done: progress("elements", 0.1 + 0.3 * done),
     )
-    foreseen = _foreseen(prediction, views)
+    foreseen = _foreseen(rig)
     timings = {**prediction.timings, "assembly": time.perf_counter() - start}
     return Covered(scene.with_record(foreseen=foreseen, cost=Cost(timings)), whole, left, light)
 
@@ -178,11 +179,9 @@ class _Silent(Sequence[Tensor]):
         return self._photos.size(index)
 
 
-def _foreseen(prediction: Prediction, views: Views) -> dict[str, list]:
+def _foreseen(rig: Rig) -> dict[str, list]:
     """What a record says of how much of each photo its neighbours foresee: nothing of a single one."""
-    if views.num_views < 2:
-        return {}
-    return foresight(views.images, prediction.depths, prediction.viewmats, views.Ks).stored()
+    return {} if len(rig) < 2 else foresight(rig).stored()
 
 
 def _shares(left: Tensor) -> dict[str, list[float]]:

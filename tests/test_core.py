@@ -23,7 +23,7 @@ def helped(values, few=4):
     return turned(values * 7)
 """
 DEEP = """
-from langflash_core.geometry.cameras import pictured as seen_at
+from langflash_core.geometry.cameras import project as seen_at
 
 def look(points):
     return seen_at(points)

@@ -21,7 +21,7 @@ import torch
 from torch import Tensor
 
 from langflash_core.errors import InputError
-from langflash_core.geometry.cameras import pictured
+from langflash_core.rig.projected import project_points
 from langflash_core.scene.instances import instances
 from langflash_core.scene.joining import appended
 from langflash_core.scene.prune import sparser
@@ -162,13 +162,9 @@ def _reached(scene: Scene, members: Tensor, render: Render) -> tuple[list[np.nda
 def _lying_in(means: Tensor, camera: Camera, depths: Tensor) -> tuple[Tensor, Tensor, Tensor]:
     """(N,) each: whether places are in a view's picture, at which of its pixels (0 outside), and whether they
     are no farther than what it shows there, depths (H, W)."""
-    columns, lines, z = pictured(camera.viewmat.cpu(), camera.K.cpu(), means.T)
-    height, width = depths.shape
-    x, y = columns.floor(), lines.floor()
-    inside = (z > 0) & (x >= 0) & (x < width) & (y >= 0) & (y < height)
-    pixels = torch.where(inside, y * width + x, 0).long()
-    shown = depths.flatten()[pixels]
-    return inside, pixels, (shown * _BESIDE >= z) | (shown <= 0)
+    there = project_points(means.T, camera.viewmat.cpu(), camera.K.cpu(), (depths.shape[0], depths.shape[1]))
+    shown = there.looked_up(depths.flatten())
+    return there.inside, there.pixels, (shown * _BESIDE >= there.z) | (shown <= 0)
 
 
 def _block_side(scene: Scene, members: Tensor, blocks: float) -> float:

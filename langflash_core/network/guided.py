@@ -44,7 +44,6 @@ from langflash_core.network.stereo.agreement import agreed
 from langflash_core.network.stereo.alignment import Correction
 from langflash_core.network.stereo.inputs import grown
 from langflash_core.network.stereo.keypoints import KeyPoints, decoded, match_photos, match_sources
-from langflash_core.network.stereo.partners import partners
 from langflash_core.network.stereo.planes import flattened
 from langflash_core.network.stereo.planesweep import searched
 from langflash_core.network.stereo.poses import PoseInput, Poses, estimate_poses, on_other_maps
@@ -53,6 +52,8 @@ from langflash_core.network.stereo.registration import registered
 from langflash_core.network.stereo.retrieval import most_alike
 from langflash_core.network.stereo.sharpening import sharpened
 from langflash_core.network.stereo.sweep import DepthRefiner
+from langflash_core.rig.neighbours import source_views
+from langflash_core.rig.rig import Rig
 from langflash_core.running import Run
 from langflash_core.types import Gaussians, Views
 
@@ -307,7 +308,7 @@ class GuidedDepthNet(LangFlashNet):
         maps = DepthMaps(scaled.log_depths[0], scaled.log_errors[0])
         if len(keep) < 2:
             return maps
-        near = partners(maps.log_depths[keep], viewmats[0, keep], Ks[0, keep])
+        near = source_views(Rig.of_logs(maps.log_depths[keep], viewmats[0, keep], Ks[0, keep]))
         log_depths, log_errors = maps.log_depths.clone(), maps.log_errors.clone()
         for some in groups_of(len(keep)):
             own, others = keep[some], [[keep[other] for other in of] for of in near[some]]
@@ -356,7 +357,7 @@ def _agreed(
         return maps
     part = DepthMaps(maps.log_depths[placed], maps.log_errors[placed])
     cameras = viewmats[placed], Ks[placed]
-    near = partners(part.log_depths, *cameras)
+    near = source_views(Rig.of_logs(part.log_depths, *cameras))
     part = agreed(part, *cameras, near)
     photos = _greys(views)
     greys = [photos[v] for v in placed]

@@ -37,7 +37,8 @@ from jaxtyping import Bool, Float, Int
 from torch import Tensor
 from torch.nn import functional as F
 
-from langflash_core.geometry.cameras import invert_rigid, pictured, transform, unproject
+from langflash_core.geometry.cameras import invert_rigid, transform, unproject
+from langflash_core.rig.rig import Rig
 
 GAIN_RANGE = (0.4, 2.5)
 """In sRGB values; almost three stops of exposure each way. What is farther off is drawn back into it."""
@@ -134,49 +135,36 @@ class Pairs:
     counted: Bool[Tensor, "E 3 P"]
 
 
-def photo_light(
-    images: Float[Tensor, "V 3 H W"],
-    depths: Float[Tensor, "V H W"],
-    confidences: Float[Tensor, "V H W"],
-    viewmats: Float[Tensor, "V 4 4"],
-    Ks: Float[Tensor, "V 3 3"],
-) -> Light:
+def photo_light(rig: Rig) -> Light:
     """The gains and offsets that bring photos of one scene to one light.
 
     Args:
-        images: in [0, 1], sRGB values. depths: z > 0, of the viewmats' unit; others are left out, as is what
-            is not finite. confidences: in [0, 1]. viewmats: of photos whose place is known. Ks: pixels.
+        rig: with photos, whose places are known, and confidences. Depths of 0 and less are left out, as is
+            what is not finite.
 
     Returns:
         float64, on the CPU. Gains in `GAIN_RANGE`, offsets up to `LARGEST_OFFSET`. Exactly the identity for a
         photo that shares nothing with others.
     """
-    inputs = (values.detach().cpu().float() for values in (images, depths, confidences, viewmats, Ks))
     with torch.no_grad():
-        return light_of(compared(*inputs), len(images))
+        return light_of(compared(rig.map(lambda values: values.detach().cpu().float())), len(rig))
 
 
-def compared(
-    images: Float[Tensor, "V 3 H W"],
-    depths: Float[Tensor, "V H W"],
-    confidences: Float[Tensor, "V H W"],
-    viewmats: Float[Tensor, "V 4 4"],
-    Ks: Float[Tensor, "V 3 3"],
-) -> Pairs:
+def compared(rig: Rig) -> Pairs:
     """The pairs that `photo_light` compares, float32 in."""
-    num_views, height, width = depths.shape
-    if num_views < 2 or min(height, width) < BLOCK:
+    num_views = len(rig)
+    if num_views < 2 or min(rig.size) < BLOCK:
         return _no_pairs()
-    blocks = _blocks(images, depths, confidences, viewmats, Ks)
+    blocks = _blocks(rig)
     shared = torch.zeros(num_views, num_views, dtype=torch.int64)
     for view in range(num_views):
-        _, agrees = _carried(blocks, blocks.points[:, blocks.coarse], viewmats, Ks, view)
+        _, agrees = _carried(blocks, blocks.points[:, blocks.coarse], rig, view)
         shared[:, view] = (agrees & _confident(blocks.own[..., blocks.coarse])).sum(-1)
     firsts, seconds = partners(shared)
     parts = []
     for view in seconds.unique().tolist():
         chosen = firsts[seconds == view]
-        there, agrees = _carried(blocks, blocks.points[chosen], viewmats, Ks, view)
+        there, agrees = _carried(blocks, blocks.points[chosen], rig, view)
         own = blocks.own[chosen]
         exposed = (own[:, 3:6] > 0.999) & (there[:, 3:6] > 0.999)
         counted = exposed & (agrees & _confident(own))[:, None]
@@ -190,31 +178,30 @@ def _no_pairs() -> Pairs:
     return Pairs(views, views, colours, colours, colours.bool())
 
 
-def _blocks(images: Tensor, depths: Tensor, confidences: Tensor, viewmats: Tensor, Ks: Tensor) -> _Blocks:
-    exposed = ((images > EXPOSED[0]) & (images < EXPOSED[1])).float()
-    full = torch.cat((images, exposed, depths[:, None], confidences[:, None]), 1)
+def _blocks(rig: Rig) -> _Blocks:
+    assert rig.photos is not None and rig.confidences is not None, "whoever compares photos has them"
+    exposed = ((rig.photos > EXPOSED[0]) & (rig.photos < EXPOSED[1])).float()
+    full = torch.cat((rig.photos, exposed, rig.depths[:, None], rig.confidences[:, None]), 1)
     maps = F.avg_pool2d(full, BLOCK, stride=1)
     every = maps[..., ::BLOCK, ::BLOCK]
     lines, columns = every.shape[-2:]
     scale = torch.tensor([BLOCK, BLOCK, 1.0])[:, None]
-    points = transform(invert_rigid(viewmats), unproject(every[:, 6], Ks / scale).flatten(1, 2))
+    points = transform(invert_rigid(rig.viewmats), unproject(every[:, 6], rig.Ks / scale).flatten(1, 2))
     coarse = torch.arange(lines * columns).view(lines, columns)
     coarse = coarse[min(_COARSE // 2, lines - 1) :: _COARSE, min(_COARSE // 2, columns - 1) :: _COARSE]
     return _Blocks(maps, every.flatten(2), points, coarse.flatten())
 
 
-def _carried(
-    blocks: _Blocks, points: Tensor, viewmats: Tensor, Ks: Tensor, view: int
-) -> tuple[Tensor, Tensor]:
+def _carried(blocks: _Blocks, points: Tensor, rig: Rig, view: int) -> tuple[Tensor, Tensor]:
     """What `view` has (n, 8, p) where points (n, p, 3) lie in it, and whether (n, p) it sees these."""
-    x, y, z = pictured(viewmats[view], Ks[view], points.flatten(0, 1).T)
+    seen = rig.project(points.flatten(0, 1).T, view)
     lines, columns = blocks.maps.shape[-2:]
     ends = torch.tensor([max(columns - 1, 1), max(lines - 1, 1)])
-    places = 2 * (torch.stack((x, y), -1) - BLOCK / 2) / ends - 1
-    inside = (z > 0) & (places.abs() <= 1).all(-1)
+    places = 2 * (torch.stack((seen.x, seen.y), -1) - BLOCK / 2) / ends - 1
+    inside = seen.inside & (places.abs() <= 1).all(-1)
     places = torch.where(inside[:, None], places, 0.0)
     there = F.grid_sample(blocks.maps[view, None], places[None, None], align_corners=True)[0, :, 0]
-    agrees = inside & ((there[6] - z).abs() < AGREES * z) & (there[7] > CONFIDENT)
+    agrees = inside & ((there[6] - seen.z).abs() < AGREES * seen.z) & (there[7] > CONFIDENT)
     return there.unflatten(1, points.shape[:2]).transpose(0, 1), agrees.view(points.shape[:2])
 
 

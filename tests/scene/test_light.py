@@ -14,22 +14,34 @@ import pytest
 import torch
 from scipy.optimize import least_squares
 
+from langflash_core.rig.rig import Rig
 from langflash_core.scene import light as module
 from langflash_core.scene.light import (
     BLOCK,
     GAIN_RANGE,
     Light,
     Pairs,
-    compared,
     light_of,
     partners,
-    photo_light,
 )
 from tests.scene.plane import wall_prediction
 from tests.torch_threads import torch_threads
 
 WIDTH, HEIGHT = 112, 84
 FAST = 0.05  # seconds of processor time for two photos
+
+
+def rig_of(images, depths, confidences, viewmats, Ks) -> Rig:
+    return Rig(viewmats, Ks, depths, confidences, images)
+
+
+def photo_light(*photos: torch.Tensor) -> Light:
+    """As `strip` gives them."""
+    return module.photo_light(rig_of(*photos))
+
+
+def compared(*photos: torch.Tensor) -> Pairs:
+    return module.compared(rig_of(*photos))
 
 
 def strip(num_views: int, shift: int = 12, seed: int = 0, low: float = 0.25, high: float = 0.75):

@@ -10,17 +10,24 @@ from torch import Tensor
 
 from langflash_core.geometry.cameras import intrinsics_from_fov, invert_rigid, rays, transform, unproject
 from langflash_core.geometry.vantage import from_the_middle, leading
+from langflash_core.rig.rig import Rig
 from langflash_core.scene import ownership
-from langflash_core.scene.ownership import (
-    BEFORE,
-    BEHIND,
-    covered,
-    filled,
-    owned,
-)
+from langflash_core.scene.ownership import BEFORE, BEHIND
 
 HEIGHT, WIDTH = 24, 32
 WALL = (0.0, 0.0, 1.0), 3.0  # n x = d, in the world
+
+
+def owned(depths: Tensor, viewmats: Tensor, Ks: Tensor, *known: Tensor) -> Tensor:
+    return ownership.owned(Rig(viewmats, Ks, depths), *known)
+
+
+def covered(depths: Tensor, viewmats: Tensor, Ks: Tensor, keep: Tensor) -> Tensor:
+    return ownership.covered(Rig(viewmats, Ks, depths), keep)
+
+
+def filled(depths: Tensor, viewmats: Tensor, Ks: Tensor, keep: Tensor, known: Tensor) -> Tensor:
+    return ownership.filled(Rig(viewmats, Ks, depths), keep, known)
 
 
 def camera(

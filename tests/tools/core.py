@@ -28,7 +28,7 @@ IRREGULAR = re.compile(
     "laid|led|left|lit|lost|made|meant|met|put|read|said|seen|sent|set|shown|sought|spent|split|spoken|spread|"
     "stood|swept|taken|taught|thought|told|torn|understood|woven|written"
 )
-PROJECTING = tuple(f"{CORE}.geometry.cameras.{name}" for name in ("pictured", "project"))
+PROJECTING = (f"{CORE}.geometry.cameras.pictured", f"{CORE}.geometry.cameras.project")
 CHOOSING = re.compile(
     r"list\[(int|list\[int\]|tuple\[int, int\])\]|tuple\[tuple\[int, \.\.\.\], \.\.\.\]|"
     r"Neighbours|Chosen|tuple\[Int\[Tensor, ' E'\], Int\[Tensor, ' E'\]\]"

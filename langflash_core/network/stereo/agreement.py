@@ -16,9 +16,10 @@ from jaxtyping import Bool, Float
 from torch import Tensor
 from torch.nn import functional as F
 
-from langflash_core.geometry.cameras import invert_rigid, pictured, pixel_grid, unproject
+from langflash_core.geometry.cameras import pixel_grid
 from langflash_core.network.stereo.prior import DepthMaps
-from langflash_core.network.stereo.sweep import Neighbours, everyone
+from langflash_core.rig.neighbours import Neighbours, everyone
+from langflash_core.rig.rig import Rig
 
 _KNOTS = 5  # a side
 _STEP = 4  # every fourth pixel of a row and of a column is compared for the correction
@@ -28,18 +29,6 @@ _INDEPENDENT = 200  # pixels go together: all compared ones count as this many a
 _EXPECTED = 0.075  # of a knot, where nothing is compared
 _BEND = 0.06  # of a knot against its neighbour
 _SAME = 0.06  # maps that differ by less, relatively, show one surface
-
-
-@dataclass(frozen=True)
-class Carried:
-    """Pixels of one map as another photo sees them.
-
-    log_depths: (P,) their log z there. places: (P, 2), -1 to 1 over that picture. inside: (P,) in view.
-    """
-
-    log_depths: Float[Tensor, " P"]
-    places: Float[Tensor, "P 2"]
-    inside: Bool[Tensor, " P"]
 
 
 def agreed(
@@ -58,28 +47,30 @@ def agreed(
 
     Source: own derivation; the blend is that of depth-map fusion (Merrell et al. 2007).
     """
-    logs = maps.log_depths
-    if len(logs) < 2:
+    if len(maps.log_depths) < 2:
         return maps
-    near = neighbours or everyone(len(logs))
-    logs = blended(straightened(logs, viewmats, Ks, near), maps.log_errors, viewmats, Ks, near)
-    return DepthMaps(logs, maps.log_errors)
+    near = neighbours or everyone(len(maps.log_depths))
+    rig = Rig.of_logs(straightened(Rig.of_logs(maps.log_depths, viewmats, Ks), near), viewmats, Ks)
+    return DepthMaps(blended(rig, maps.log_errors, near), maps.log_errors)
 
 
-def carried(
-    points: Float[Tensor, "n 3"],
-    viewmats: Float[Tensor, "V 4 4"],
-    Ks: Float[Tensor, "V 3 3"],
-    view: int,
-    other: int,
-    size: tuple[int, int],
-) -> Carried:
-    """Points (P, 3) in the frame of `view`'s camera, seen from `other`, whose picture is `size` = (H, W)."""
-    x, y, depths = pictured(viewmats[other] @ invert_rigid(viewmats[view]), Ks[other], points.T)
-    height, width = size
-    x, y = (x / width * 2 - 1).clamp(-4, 4), (y / height * 2 - 1).clamp(-4, 4)
-    inside = (depths > 1e-4) & (x.abs() <= 1) & (y.abs() <= 1)
-    return Carried(depths.clamp_min(1e-4).log(), torch.stack((x, y), -1), inside)
+@dataclass(frozen=True)
+class Carried:
+    """Pixels of one map as another photo sees them.
+
+    log_depths: (P,) their log z there. places: (P, 2), -1 to 1 over that picture. inside: (P,) in view.
+    """
+
+    log_depths: Float[Tensor, " P"]
+    places: Float[Tensor, "P 2"]
+    inside: Bool[Tensor, " P"]
+
+
+def carried(rig: Rig, view: int, other: int, points: Float[Tensor, "3 P"]) -> Carried:
+    """Points (3, P) in the frame of `view`'s camera, seen from `other`."""
+    there = rig.reproject(view, other, points)
+    places = torch.stack([along.clamp(-4, 4) for along in there.scaled], -1)
+    return Carried(there.z.clamp_min(1e-4).log(), places, there.inside)
 
 
 def sampled(maps: Float[Tensor, "H W"], places: Float[Tensor, "P 2"]) -> Float[Tensor, " P"]:
@@ -89,54 +80,45 @@ def sampled(maps: Float[Tensor, "H W"], places: Float[Tensor, "P 2"]) -> Float[T
     ]
 
 
-def straightened(
-    log_depths: Float[Tensor, "V H W"],
-    viewmats: Float[Tensor, "V 4 4"],
-    Ks: Float[Tensor, "V 3 3"],
-    neighbours: Neighbours,
-) -> Float[Tensor, "V H W"]:
+def straightened(rig: Rig, neighbours: Neighbours) -> Float[Tensor, "V H W"]:
     """Log depths (V, H, W) plus the smooth corrections under which they differ least.
 
     With r the log depth that the other map has less the one that is carried there, and hat functions
     h over the knots, the corrections c minimise sum rho(r + h(x') c_other - h(x) c_own) and what is
     expected of c: small, and alike at neighbouring knots.
     """
-    num_views, height, width = log_depths.shape
+    num_views, (height, width) = len(rig), rig.size
     sparse = (slice(_STEP // 2, None, _STEP), slice(_STEP // 2, None, _STEP))
-    grid = pixel_grid(width, height, like=log_depths) / log_depths.new_tensor([width, height]) * 2 - 1
+    grid = pixel_grid(width, height, like=rig.depths) / rig.depths.new_tensor([width, height]) * 2 - 1
     hats = knot_weights(grid.flatten(0, 1))  # (H W, S^2)
     own_hats = hats.unflatten(0, (height, width))[sparse].flatten(0, 1).double()
     prior = _expectation(hats.device)
     knots = prior.new_zeros(num_views, _KNOTS**2)
-    logs = log_depths
+    now = rig
     for _ in range(_ITERATIONS):
-        points = [unproject(own.exp(), K)[sparse].flatten(0, 1) for own, K in zip(logs, Ks, strict=True)]
+        points = [now.in_camera(view)[sparse].flatten(0, 1).T for view in range(num_views)]
         normal = torch.block_diag(*[prior] * num_views)
         right = -(knots @ prior).flatten()
-        sums = _comparisons(logs, points, own_hats, viewmats, Ks, neighbours)
+        sums = _comparisons(now, points, own_hats, neighbours)
         knots = knots + torch.linalg.solve(normal + sums[0], right + sums[1]).view_as(knots)
-        logs = log_depths + (knots.to(hats) @ hats.T).view_as(log_depths)
-    return logs
+        logs = rig.log_depths + (knots.to(hats) @ hats.T).view_as(rig.depths)
+        now = Rig.of_logs(logs, rig.viewmats, rig.Ks)
+    return now.log_depths
 
 
 def _comparisons(
-    logs: Tensor,
-    points: list[Tensor],
-    own_hats: Tensor,
-    viewmats: Tensor,
-    Ks: Tensor,
-    neighbours: Neighbours,
+    rig: Rig, points: list[Tensor], own_hats: Tensor, neighbours: Neighbours
 ) -> tuple[Tensor, Tensor]:
     """Normal matrix (V S^2, V S^2) and right side (V S^2,) of all maps and their neighbours', float64."""
-    num_views, size, width = len(logs), (logs.shape[1], logs.shape[2]), _KNOTS**2
+    num_views, width = len(rig), _KNOTS**2
     normal = own_hats.new_zeros(num_views, width, num_views, width)
     right, count = own_hats.new_zeros(num_views, width), 0
     for a, others in enumerate(neighbours):
         for b in others:
-            there = carried(points[a], viewmats, Ks, a, b, size)
+            there = carried(rig, a, b, points[a])
             left = own_hats[there.inside]
             other = knot_weights(there.places[there.inside]).double()
-            gap = (sampled(logs[b], there.places) - there.log_depths)[there.inside].double()
+            gap = (sampled(rig.log_depths[b], there.places) - there.log_depths)[there.inside].double()
             weights = (1 + (gap / _SCALE) ** 2) ** -2 / _SCALE**2
             weighted, weighted_other = left * weights[:, None], other * weights[:, None]
             normal[a, :, a] += weighted.T @ left
@@ -165,26 +147,19 @@ def _expectation(device: torch.device) -> Tensor:
     return torch.eye(_KNOTS**2, dtype=torch.float64, device=device) / _EXPECTED**2 + rough / _BEND**2
 
 
-def blended(
-    log_depths: Float[Tensor, "V H W"],
-    log_errors: Float[Tensor, "V H W"],
-    viewmats: Float[Tensor, "V 4 4"],
-    Ks: Float[Tensor, "V 3 3"],
-    neighbours: Neighbours,
-) -> Float[Tensor, "V H W"]:
+def blended(rig: Rig, log_errors: Float[Tensor, "V H W"], neighbours: Neighbours) -> Float[Tensor, "V H W"]:
     """Log depths (V, H, W): where others show the same surface, the mean of all, weighted by 1 / b^2."""
-    height, width = log_depths.shape[1:]
     blended_logs = []
     for a, others in enumerate(neighbours):
-        points = unproject(log_depths[a].exp(), Ks[a]).flatten(0, 1)
-        own = log_depths[a].flatten()
+        points = rig.in_camera(a).flatten(0, 1).T
+        own = rig.log_depths[a].flatten()
         total = (-2 * log_errors[a]).exp().flatten()
         change = torch.zeros_like(own)
         for b in others:
-            there = carried(points, viewmats, Ks, a, b, (height, width))
-            gap = sampled(log_depths[b], there.places) - there.log_depths
+            there = carried(rig, a, b, points)
+            gap = sampled(rig.log_depths[b], there.places) - there.log_depths
             same = there.inside & (gap.abs() < _SAME)
             weight = (-2 * sampled(log_errors[b], there.places)).exp() * same
             change, total = change + weight * gap.nan_to_num(), total + weight
-        blended_logs.append((own + change / total).view(height, width))
+        blended_logs.append((own + change / total).view(rig.size))
     return torch.stack(blended_logs)

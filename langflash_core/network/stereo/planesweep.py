@@ -22,9 +22,10 @@ import torch
 from jaxtyping import Bool, Float, UInt8
 from torch import Tensor
 
-from langflash_core.geometry.cameras import invert_rigid, pictured, pixel_grid
+from langflash_core.geometry.cameras import invert_rigid, unproject
 from langflash_core.network.stereo.registration import ONE_SHIFT, resized, smooth
-from langflash_core.network.stereo.sweep import Neighbours
+from langflash_core.rig.neighbours import Neighbours
+from langflash_core.rig.projected import project_points
 
 _PLANES = 48
 _NEARER = 2.0  # times nearer than all but a hundredth of the map, where planes begin
@@ -102,16 +103,9 @@ class _Scene:
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Where the pixels of a view lie in another's picture at these depths, x and y (H, W), far outside
         where that sees nothing of them, and their log depths there."""
-        height, width = self.size
-        grid = pixel_grid(width, height, like=self.Ks).flatten(0, 1).T
-        K = self.Ks[view]
-        ahead = torch.cat(((grid - K[:2, 2:]) / K.diagonal()[:2, None], torch.ones_like(grid[:1])))
-        points = ahead * torch.from_numpy(log_depths).double().exp().flatten()
-        x, y, z = (
-            along.view(height, width).numpy()
-            for along in pictured(self.pose(view, other), self.Ks[other], points)
-        )
-        inside = (z > 0) & (x > 0) & (y > 0) & (x < width) & (y < height)
+        points = unproject(torch.from_numpy(log_depths).double().exp(), self.Ks[view]).flatten(0, 1).T
+        there = project_points(points, self.pose(view, other), self.Ks[other], self.size)
+        x, y, z, inside = (v.view(self.size).numpy() for v in (there.x, there.y, there.z, there.inside))
         x, y = (np.where(inside, along, -1e4).astype(np.float32) for along in (x, y))
         return x, y, np.log(np.maximum(z, 1e-6))
 

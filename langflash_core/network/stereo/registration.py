@@ -30,9 +30,10 @@ from scipy.sparse.linalg import cg
 from torch import Tensor
 from torch.nn import functional as F
 
-from langflash_core.geometry.cameras import invert_rigid, pictured, unproject
+from langflash_core.geometry.cameras import invert_rigid, unproject
 from langflash_core.network.stereo.prior import DepthMaps
-from langflash_core.network.stereo.sweep import Neighbours, everyone
+from langflash_core.rig.neighbours import Neighbours, everyone
+from langflash_core.rig.projected import project_points
 
 _LARGEST = 3  # times the maps' size, at which photos are compared
 _SMALLEST = 12  # pixels of a photo's side, with which flow works
@@ -202,8 +203,8 @@ def _matched(
 ) -> _Matches:
     height, width = log_depths.shape
     points = unproject(log_depths.exp(), K).flatten(0, 1).T
-    x, y, z = (along.view(height, width).numpy() for along in pictured(pose, other_K, points))
-    seen = (z > 0) & (x > _MARGIN) & (y > _MARGIN) & (x < width - _MARGIN) & (y < height - _MARGIN)
+    there = project_points(points, pose, other_K, (height, width))
+    x, y, seen = (along.view(height, width).numpy() for along in (there.x, there.y, there.within(_MARGIN)))
     x, y = (np.where(seen, along, -1e4).astype(np.float32) for along in (x, y))
     brought = _looked_up(other, x - 0.5, y - 0.5)
     flow = cv2.DISOpticalFlow.create(cv2.DISOPTICAL_FLOW_PRESET_MEDIUM)

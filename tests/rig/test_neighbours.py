@@ -1,4 +1,4 @@
-"""Partners of a photo's depth: those that see the same from another side."""
+"""Neighbours of a photo: those that see the same from another side, those that see its points, all."""
 
 import math
 
@@ -6,9 +6,14 @@ import torch
 from torch import Tensor
 
 from langflash_core.geometry.cameras import intrinsics_from_fov, rays
-from langflash_core.network.stereo.partners import PARTNERS, partners
+from langflash_core.rig.neighbours import PARTNERS, Neighbours, everyone, neighbours, source_views
+from langflash_core.rig.rig import Rig
 
 WIDTH, HEIGHT, WALL = 84, 63, 3.0
+
+
+def partners(logs: Tensor, viewmats: Tensor, Ks: Tensor, count: int = PARTNERS) -> Neighbours:
+    return source_views(Rig.of_logs(logs, viewmats, Ks), "angle", count)
 
 
 def ring(degrees: list[float]) -> tuple[Tensor, Tensor, Tensor]:
@@ -80,3 +85,14 @@ def test_what_is_no_number_chooses_nobody_wrong():
     logs[1] = torch.nan
     near = partners(logs, viewmats, Ks)
     assert list(near[0]) == [2] and list(near[1]) == []
+
+
+def test_by_sight_those_are_asked_that_have_the_points_before_them():
+    """All of few; of more than are asked those alone that see some of the wall, evenly over all of them."""
+    logs, viewmats, Ks = ring([0.0, 2.0, 4.0, 6.0, 8.0])
+    viewmats[3, :3, :3] = torch.diag(torch.tensor([-1.0, 1.0, -1.0])) @ viewmats[3, :3, :3]
+    rig = Rig.of_logs(logs, viewmats, Ks)
+    assert neighbours(rig, 0, "sight") == [1, 2, 3, 4]
+    assert neighbours(rig, 0, "sight", 3) == [1, 2, 4]
+    assert neighbours(rig, 0, "sight", 1) == [2]
+    assert neighbours(rig, 2, "all") == list(everyone(5)[2]) == [0, 1, 3, 4]
