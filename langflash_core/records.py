@@ -33,17 +33,6 @@ class FoundFocal:
     bend_error: float = 0.0
 
 
-class BentLens(Exception):
-    """Photos bend straight lines, so they are to be straightened before they are looked at again.
-
-    found: of each lens what was found, None: nothing.
-    """
-
-    def __init__(self, found: tuple[FoundFocal | None, ...]):
-        super().__init__("photos are to be straightened")
-        self.found = found
-
-
 @dataclass(frozen=True)
 class FoundLens:
     """What photos told of the lens that they were taken with.

@@ -277,6 +277,8 @@ class GuidedDepthNet(LangFlashNet):
             local = _one_by_one(self.local, images[0])
             inputs = self._pose_inputs(Ks[0], views.size, prior, local)
             poses = estimate_poses(inputs, _key_points(views, run), run.check, _known(views), _sought(views))
+            if poses.bent:
+                return Geometry.of_bent(poses.bent)
             Ks = _with_lens(Ks, poses)
             if np.abs(np.log(poses.growths)).max() > _OTHER_LENS:
                 levels = self.levels(tokens, Ks)

@@ -33,7 +33,7 @@ from langflash_core.network.stereo.matching import (
     relative_pose,
     triangulate,
 )
-from langflash_core.records import BentLens, FoundFocal
+from langflash_core.records import FoundFocal
 
 _MIN_SHARE = 0.25  # of the matches must agree with a pose
 _MAX_DEPTH_SIGMA = 0.2  # log-depth error beyond which a triangulated match says too little
@@ -53,7 +53,9 @@ class Poses:
     """viewmats (V, 4, 4), world = view 0; depth_scales (V,) that bring each view's depth map to
     view 0's unit; corrections: what matches say of each map beyond its scale, on the log depths
     before scaling; guessed: views that no match supports. adjusted: where three and more were placed, what
-    they say together, with the lens. doubt: a sentence where photos do not look as known poses say."""
+    they say together, with the lens. doubt: a sentence where photos do not look as known poses say. bent:
+    lenses that bend lines, in the order of `Sought`, so that photos are to be straightened first; nothing
+    else was sought then."""
 
     viewmats: Float[np.ndarray, "V 4 4"]
     depth_scales: Float[np.ndarray, " V"]
@@ -61,6 +63,13 @@ class Poses:
     guessed: tuple[int, ...]
     adjusted: Adjusted | None = None
     doubt: str = ""
+    bent: tuple[FoundFocal | None, ...] = ()
+
+    @staticmethod
+    def of_bent(lenses: tuple[FoundFocal | None, ...], num_views: int) -> "Poses":
+        """No poses, because depth and pictures take lines for straight."""
+        nowhere, ones = np.tile(np.eye(4), (num_views, 1, 1)), np.ones(num_views)
+        return Poses(nowhere, ones, num_views * (NO_CORRECTION,), (), bent=lenses)
 
     @property
     def growths(self) -> Float[np.ndarray, " V"]:
@@ -91,8 +100,7 @@ def estimate_poses(
         sought: lenses that may be corrected; None: all are given.
 
     Raises:
-        InputError: the photos do not fit the poses that are given. BentLens: lines are bent, where that is
-            sought.
+        InputError: the photos do not fit the poses that are given.
     """
     num_views = len(views)
     told = {edge: rows for edge, rows in points.pairs.items() if not _blank(points, edge)}
@@ -140,7 +148,9 @@ def _together(views: list[PoseInput], points: KeyPoints, sought: Sought, check: 
     if max(sought.doubts) > 0:
         few = _few(len(views), {edge: len(rows) for edge, rows in points.pairs.items()})
         first = _solved(*_part(views, points, sought, few), check)
-        _check_straight(first[2])
+        bent = _bent(first[2])
+        if bent:
+            return Poses.of_bent(bent, len(views))
         sought = replace(sought, bends=False)
         growths = _other_lenses(first[2], sought)
         solved = first if len(few) == len(views) and (growths == 1).all() else None
@@ -155,14 +165,10 @@ def _together(views: list[PoseInput], points: KeyPoints, sought: Sought, check: 
     return _of_adjusted(adjusted, seen, found.missing)
 
 
-def _check_straight(adjusted: Adjusted | None) -> None:
-    """Refuse photos whose lens bends lines: depth and pictures take them for straight.
-
-    Raises:
-        BentLens: with all lenses, in the order of `Sought`.
-    """
-    if adjusted is not None and any(lens is not None and lens.bend for lens in adjusted.lenses):
-        raise BentLens(adjusted.lenses)
+def _bent(adjusted: Adjusted | None) -> tuple[FoundFocal | None, ...]:
+    """All lenses, where one of them bends lines."""
+    some = adjusted is not None and any(lens is not None and lens.bend for lens in adjusted.lenses)
+    return adjusted.lenses if some and adjusted is not None else ()
 
 
 def _solved(
