@@ -3,6 +3,7 @@
 Sizes: V photos, H W pixels of their depth maps, n points.
 """
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cached_property
@@ -16,6 +17,15 @@ from langflash_core.rig.projected import Projected, project_points
 
 Some = int | slice | Sequence[int]
 """One photo, by its number, or several."""
+
+
+CONFIDENT_ERROR = 0.1
+"""Relative error of depth that counts as a confidence of 1/2."""
+
+
+def confidences_of(log_errors: Float[Tensor, "*n"]) -> Float[Tensor, "*n"]:
+    """1 / (1 + b / `CONFIDENT_ERROR`), in (0, 1), of log b, the expected absolute error of log depth."""
+    return torch.sigmoid(torch.log(torch.tensor(CONFIDENT_ERROR)) - log_errors)
 
 
 @dataclass(frozen=True)
@@ -51,11 +61,19 @@ class Rig:
 
     @staticmethod
     def of_logs(
-        log_depths: Float[Tensor, "V H W"], viewmats: Float[Tensor, "V 4 4"], Ks: Float[Tensor, "V 3 3"]
+        log_depths: Float[Tensor, "V H W"],
+        viewmats: Float[Tensor, "V 4 4"],
+        Ks: Float[Tensor, "V 3 3"],
+        log_errors: Float[Tensor, "V H W"] | None = None,
+        photos: Float[Tensor, "V 3 H W"] | None = None,
     ) -> "Rig":
-        """With `log_depths` bit by bit: a logarithm of what was raised again is another number."""
-        rig = Rig(viewmats, Ks, log_depths.exp())
+        """With `log_depths` and `log_errors` bit by bit: a logarithm of what was raised again is another
+        number."""
+        confidences = None if log_errors is None else confidences_of(log_errors)
+        rig = Rig(viewmats, Ks, log_depths.exp(), confidences, photos)
         rig.__dict__["log_depths"] = log_depths
+        if log_errors is not None:
+            rig.__dict__["log_errors"] = log_errors
         return rig
 
     @property
@@ -73,10 +91,29 @@ class Rig:
         """Natural logarithms."""
         return self.depths.log()
 
+    @cached_property
+    def log_errors(self) -> Float[Tensor, "V H W"]:
+        """Natural logarithm of b, the expected absolute error of log depth (`confidences_of`)."""
+        assert self.confidences is not None, "whoever asks knows them"
+        return math.log(CONFIDENT_ERROR) - self.confidences.logit()
+
+    def with_logs(self, log_depths: Float[Tensor, "V H W"]) -> "Rig":
+        """The same photos with other depths."""
+        errors = None if self.confidences is None else self.log_errors
+        return Rig.of_logs(log_depths, self.viewmats, self.Ks, errors, self.photos)
+
+    def some(self, views: Sequence[int]) -> "Rig":
+        """Some of the photos, bit by bit."""
+        chosen = list(views)
+        errors = None if self.confidences is None else self.log_errors[chosen]
+        photos = None if self.photos is None else self.photos[chosen]
+        logs, viewmats, Ks = (values[chosen] for values in (self.log_depths, self.viewmats, self.Ks))
+        return Rig.of_logs(logs, viewmats, Ks, errors, photos)
+
     def map(self, change: Callable[[Tensor], Tensor]) -> "Rig":
         """Apply `change` to every field (casting, moving)."""
-        fields = (self.viewmats, self.Ks, self.depths, self.confidences, self.photos)
-        return Rig(*(None if values is None else change(values) for values in fields))
+        confidences, photos = (None if v is None else change(v) for v in (self.confidences, self.photos))
+        return Rig(change(self.viewmats), change(self.Ks), change(self.depths), confidences, photos)
 
     def in_camera(self, view: int) -> Float[Tensor, "H W 3"]:
         """What the pixels of a photo show, in the frame of its camera."""

@@ -8,7 +8,6 @@ from scipy.optimize import minimize
 from langflash_core.geometry.cameras import rays, unproject
 from langflash_core.network.stereo import agreement
 from langflash_core.network.stereo.agreement import (
-    agreed,
     blended,
     carried,
     knot_weights,
@@ -21,6 +20,11 @@ from langflash_core.rig.rig import Rig
 HEIGHT, WIDTH = 48, 64
 K = torch.tensor([[60.0, 0, 32], [0, 60.0, 24], [0, 0, 1]], dtype=torch.float64)
 KS = K.expand(2, 3, 3)
+
+
+def agreed(maps: DepthMaps, viewmats: torch.Tensor, Ks: torch.Tensor, *near) -> DepthMaps:
+    found = agreement.agreed(Rig.of_logs(maps.log_depths, viewmats, Ks, maps.log_errors), *near)
+    return DepthMaps(found.log_depths, found.log_errors)
 
 
 def _wall(dtype: torch.dtype = torch.float64) -> tuple[torch.Tensor, torch.Tensor]:
@@ -64,7 +68,7 @@ def test_the_surer_photo_counts_more():
     logs, viewmats = _wall()
     moved = torch.stack((logs[0], logs[1] + 0.03))
     errors = torch.stack((torch.full_like(logs[0], -4.0), torch.full_like(logs[1], -2.0)))
-    mean = blended(Rig.of_logs(moved, viewmats, KS), errors, everyone(2))
+    mean = blended(Rig.of_logs(moved, viewmats, KS, errors), everyone(2))
     inside = (slice(8, -8), slice(24, -8))
     assert (mean[0] - logs[0])[inside].abs().max() < 0.002  # 1 / (1 + e^4) of .03
     assert (mean[1] - logs[1])[8:-8, 8:-24].abs().max() < 0.002

@@ -18,8 +18,8 @@ from langflash_core.network.stereo.planesweep import (
     _planes,
     _Scene,
     _Windows,
-    searched,
 )
+from langflash_core.rig.rig import Rig
 
 WIDTH, HEIGHT, LARGE = 96, 72, 3
 K = torch.tensor([[80.0, 0, 48], [0, 80.0, 36], [0, 0, 1]])
@@ -27,6 +27,10 @@ WALL, THING = 3.0, 1.2
 SIDE = 0.2  # half, of the square thing
 PLACES = ((0.0, 0.0, 0.0), (0.3, 0.02, 0.0), (-0.25, 0.1, 0.05), (0.05, -0.3, -0.05))
 ALL = [[other for other in range(4) if other != view] for view in range(4)]
+
+
+def searched(logs: Tensor, photos: list[np.ndarray], poses: Tensor, Ks: Tensor, *more) -> Tensor:
+    return planesweep.searched(Rig.of_logs(logs, poses, Ks), photos, *more).log_depths
 
 
 def surface(seed: int) -> np.ndarray:

@@ -16,15 +16,14 @@ import torch
 from torch import Tensor
 from torch.nn import functional as F
 
-from langflash_core.network.guided import _agreed
 from langflash_core.network.stereo import registration
-from langflash_core.network.stereo.poses import Poses
-from langflash_core.network.stereo.prior import DepthMaps
 from langflash_core.network.stereo.registration import (
     _STIFF,
     registered,
     smooth,
 )
+from langflash_core.network.stereo.surfaces import flatten, one_surface, sharpen
+from langflash_core.rig.rig import Rig
 from langflash_core.running import Run
 from langflash_core.types import Views
 
@@ -51,9 +50,10 @@ class Room:
     viewmats: Tensor
 
     def registered(self, logs: Tensor, **more) -> Tensor:
-        maps = DepthMaps(logs, torch.full_like(logs, -2.5))
-        found = registered(maps, self.photos, self.viewmats, K.expand(len(logs), 3, 3), **more)
-        assert found.log_errors is maps.log_errors
+        errors = torch.full_like(logs, -2.5)
+        rig = Rig.of_logs(logs, self.viewmats, K.expand(len(logs), 3, 3), errors)
+        found = registered(rig, self.photos, **more)
+        assert found.log_errors is errors
         return found.log_depths
 
 
@@ -349,7 +349,7 @@ def test_small_maps(size):
     logs = torch.zeros(2, *size)
     rng = np.random.default_rng(0)
     photos = [rng.integers(0, 256, (3 * size[0], 3 * size[1]), dtype=np.uint8) for _ in range(2)]
-    found = registered(DepthMaps(logs, logs), photos, torch.eye(4).expand(2, 4, 4), K.expand(2, 3, 3))
+    found = registered(Rig.of_logs(logs, torch.eye(4).expand(2, 4, 4), K.expand(2, 3, 3), logs), photos)
     assert found.log_depths.shape == logs.shape and found.log_depths.isfinite().all()
 
 
@@ -383,11 +383,13 @@ def test_guided_depth_registers_photos_of_known_pose_and_leaves_planes(pair):
     logs, viewmats, Ks = pair.logs[order], pair.viewmats[order], K.expand(3, 3, 3)
     photos = torch.from_numpy(np.stack([pair.photos[v] for v in order]))
     views = Views(photos[:, None].expand(-1, 3, -1, -1) / 255, Ks, ("a", "b", "c"))
-    placed = Poses(viewmats.double().numpy(), np.ones(3), (), (2,))
-    maps = DepthMaps(logs + 0.01 * ripples, torch.full_like(logs, -2.5))
+    errors = torch.full_like(logs, -2.5)
     small = F.interpolate(views.images, size=(HEIGHT, WIDTH), mode="area")
-    found = _agreed(maps, small, views, placed, viewmats, Ks, Run({}))
-    assert torch.equal(found.log_depths[2], maps.log_depths[2]) and found.log_errors is maps.log_errors
+    rig = Rig.of_logs(logs + 0.01 * ripples, viewmats, Ks, errors, small)
+    found = one_surface(rig, (2,), views, Run({}))
+    assert (
+        torch.equal(found.log_depths[2], flatten(sharpen(rig)).log_depths[2]) and found.log_errors is errors
+    )
     left = (found.log_depths - logs)[:2]
     assert left.abs().mean() < 0.01 * ripples.abs().mean() / 3
     assert left[:, 10:-10, 15:-15].std() < 0.01 * ripples.std() / 4

@@ -23,8 +23,8 @@ def drawn(dtype: torch.dtype = torch.float64) -> Rig:
     viewmats = torch.eye(4, dtype=torch.float64).repeat(3, 1, 1)
     for view, turn in enumerate(((0.0, 0.1, 0.0), (0.2, -0.3, 0.1), (-0.1, 0.2, 0.6))):
         angle = math.hypot(*turn)
-        axis = (math.sin(angle / 2) / angle * part for part in turn)
-        viewmats[view, :3, :3] = torch.from_numpy(matrix((math.cos(angle / 2), *axis))[:3, :3])
+        x, y, z = (math.sin(angle / 2) / angle * part for part in turn)
+        viewmats[view, :3, :3] = torch.from_numpy(matrix((math.cos(angle / 2), x, y, z))[:3, :3])
         viewmats[view, :3, 3] = torch.randn(3, generator=g, dtype=torch.float64) / 3
     depths = 1 + 2 * torch.rand(3, HEIGHT, WIDTH, generator=g, dtype=torch.float64)
     Ks = torch.stack([intrinsics_from_fov(fov, WIDTH, HEIGHT) for fov in (50, 60, 70)])
@@ -110,6 +110,12 @@ def test_logarithms_stay_bit_by_bit():
     rig = Rig.of_logs(logs, torch.eye(4)[None], torch.eye(3)[None])
     assert rig.log_depths is logs and torch.equal(rig.depths, logs.exp())
     assert (rig.depths.log() != logs).any()  # so it matters
+    moved, errors = Rig.of_logs(logs, rig.viewmats, rig.Ks, logs - 4), rig.with_logs(logs + 1).log_depths
+    assert torch.equal(errors, logs + 1) and moved.some([0]).log_errors.equal(logs - 4)
+    # An error of log depth of .1 is a confidence of 1/2; float32 of a logit of up to 8 has 1e-6.
+    sure = Rig(rig.viewmats, rig.Ks, rig.depths, moved.confidences)
+    assert (sure.log_errors - (logs - 4)).abs().max() < 1e-4
+    assert moved.with_logs(logs + 1).log_errors.equal(logs - 4)
 
 
 @pytest.mark.parametrize(

@@ -17,7 +17,6 @@ from torch import Tensor
 from torch.nn import functional as F
 
 from langflash_core.geometry.cameras import pixel_grid
-from langflash_core.network.stereo.prior import DepthMaps
 from langflash_core.rig.neighbours import Neighbours, everyone
 from langflash_core.rig.rig import Rig
 
@@ -31,27 +30,21 @@ _BEND = 0.06  # of a knot against its neighbour
 _SAME = 0.06  # maps that differ by less, relatively, show one surface
 
 
-def agreed(
-    maps: DepthMaps,
-    viewmats: Float[Tensor, "V 4 4"],
-    Ks: Float[Tensor, "V 3 3"],
-    neighbours: Neighbours | None = None,
-) -> DepthMaps:
-    """Maps (V, H, W) that agree where they show one surface; the expected errors stay.
+def agreed(rig: Rig, neighbours: Neighbours | None = None) -> Rig:
+    """Depths that agree where they show one surface; the expected errors stay.
 
     One view, or views that share nothing, come back as they are.
 
     Args:
-        viewmats: (V, 4, 4) of the maps' unit. Ks: (V, 3, 3), pixels of the maps.
-        neighbours: of each view those that it is compared with; None: all others.
+        rig: with confidences. neighbours: of each view those that it is compared with; None: all others.
 
     Source: own derivation; the blend is that of depth-map fusion (Merrell et al. 2007).
     """
-    if len(maps.log_depths) < 2:
-        return maps
-    near = neighbours or everyone(len(maps.log_depths))
-    rig = Rig.of_logs(straightened(Rig.of_logs(maps.log_depths, viewmats, Ks), near), viewmats, Ks)
-    return DepthMaps(blended(rig, maps.log_errors, near), maps.log_errors)
+    if len(rig) < 2:
+        return rig
+    near = neighbours or everyone(len(rig))
+    straight = rig.with_logs(straightened(rig, near))
+    return straight.with_logs(blended(straight, near))
 
 
 @dataclass(frozen=True)
@@ -102,7 +95,7 @@ def straightened(rig: Rig, neighbours: Neighbours) -> Float[Tensor, "V H W"]:
         sums = _comparisons(now, points, own_hats, neighbours)
         knots = knots + torch.linalg.solve(normal + sums[0], right + sums[1]).view_as(knots)
         logs = rig.log_depths + (knots.to(hats) @ hats.T).view_as(rig.depths)
-        now = Rig.of_logs(logs, rig.viewmats, rig.Ks)
+        now = rig.with_logs(logs)
     return now.log_depths
 
 
@@ -147,9 +140,9 @@ def _expectation(device: torch.device) -> Tensor:
     return torch.eye(_KNOTS**2, dtype=torch.float64, device=device) / _EXPECTED**2 + rough / _BEND**2
 
 
-def blended(rig: Rig, log_errors: Float[Tensor, "V H W"], neighbours: Neighbours) -> Float[Tensor, "V H W"]:
+def blended(rig: Rig, neighbours: Neighbours) -> Float[Tensor, "V H W"]:
     """Log depths (V, H, W): where others show the same surface, the mean of all, weighted by 1 / b^2."""
-    blended_logs = []
+    blended_logs, log_errors = [], rig.log_errors
     for a, others in enumerate(neighbours):
         points = rig.in_camera(a).flatten(0, 1).T
         own = rig.log_depths[a].flatten()

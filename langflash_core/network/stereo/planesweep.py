@@ -26,6 +26,7 @@ from langflash_core.geometry.cameras import invert_rigid, unproject
 from langflash_core.network.stereo.registration import ONE_SHIFT, resized, smooth
 from langflash_core.rig.neighbours import Neighbours
 from langflash_core.rig.projected import project_points
+from langflash_core.rig.rig import Rig
 
 _PLANES = 48
 _NEARER = 2.0  # times nearer than all but a hundredth of the map, where planes begin
@@ -50,25 +51,22 @@ class _Found:
 
 
 def searched(
-    log_depths: Float[Tensor, "V H W"],
+    rig: Rig,
     photos: Sequence[UInt8[np.ndarray, "_ _"]],
-    viewmats: Float[Tensor, "V 4 4"],
-    Ks: Float[Tensor, "V 3 3"],
     neighbours: Neighbours,
     check: Callable[[], None] = lambda: None,
-) -> Float[Tensor, "V H W"]:
-    """Log depths (V, H, W) with what a plane over the whole range explains better; a view with fewer than two
-    neighbours stays as it is.
+) -> Rig:
+    """Depths with what a plane over the whole range explains better; a view with fewer than two neighbours
+    stays as it is.
 
     Args:
-        photos: (_, _) uint8, grey, of each view, the maps' picture at any size.
-        viewmats: (V, 4, 4) of the maps' unit. Ks: (V, 3, 3), pixels of the maps.
+        photos: (_, _) uint8, grey, of each view, the rig's photos at any size.
         neighbours: of each view.
         check: called before each view is looked at; what it raises ends the work.
     """
-    maps, size = log_depths.cpu(), (log_depths.shape[1], log_depths.shape[2])
-    greys = [resized(photo, size) for photo in photos]
-    scene = _Scene(greys, [own.numpy() for own in maps], viewmats.cpu().double(), Ks.cpu().double())
+    maps = rig.log_depths.cpu()
+    greys = [resized(photo, rig.size) for photo in photos]
+    scene = _Scene(greys, [own.numpy() for own in maps], rig.viewmats.cpu().double(), rig.Ks.cpu().double())
     found = []
     for view, others in enumerate(neighbours):
         check()
@@ -77,7 +75,7 @@ def searched(
         own + _carried_over(scene, view, found, of)
         for view, (own, of) in enumerate(zip(maps, neighbours, strict=True))
     ]
-    return torch.stack(changed).to(log_depths)
+    return rig.with_logs(torch.stack(changed).to(rig.depths))
 
 
 @dataclass(frozen=True)

@@ -25,15 +25,15 @@ import cv2
 import numpy as np
 import scipy.sparse
 import torch
-from jaxtyping import Float, UInt8
+from jaxtyping import UInt8
 from scipy.sparse.linalg import cg
 from torch import Tensor
 from torch.nn import functional as F
 
 from langflash_core.geometry.cameras import invert_rigid, unproject
-from langflash_core.network.stereo.prior import DepthMaps
 from langflash_core.rig.neighbours import Neighbours, everyone
 from langflash_core.rig.projected import project_points
+from langflash_core.rig.rig import Rig
 
 _LARGEST = 3  # times the maps' size, at which photos are compared
 _SMALLEST = 12  # pixels of a photo's side, with which flow works
@@ -107,31 +107,27 @@ class _Matches:
 
 
 def registered(
-    maps: DepthMaps,
+    rig: Rig,
     photos: Sequence[UInt8[np.ndarray, "_ _"]],
-    viewmats: Float[Tensor, "V 4 4"],
-    Ks: Float[Tensor, "V 3 3"],
     neighbours: Neighbours | None = None,
     check: Callable[[], None] = lambda: None,
     each: Callable[[int, Callable[[], Tensor]], Tensor] = lambda view, make: make(),
-) -> DepthMaps:
-    """Maps (V, H, W) whose surfaces show the same in neighbouring photos; the expected errors stay.
+) -> Rig:
+    """Depths whose surfaces show the same in neighbouring photos; the expected errors stay.
 
     Args:
-        photos: (h, w) uint8, grey, of each view, the maps' picture at its own size.
-        viewmats: (V, 4, 4) of the maps' unit. Ks: (V, 3, 3), pixels of the maps.
+        photos: (h, w) uint8, grey, of each view, the rig's photos at their own size.
         neighbours: of each view, the best first; None: all others.
         check: called before each comparison; what it raises ends the work.
-        each: gives the map (H, W) of a view, which it may have made, or know already.
+        each: gives the log depths (H, W) of a view, which it may have made, or know already.
     """
-    logs = maps.log_depths
-    near = neighbours or everyone(len(logs))
-    cells = (logs.shape[1], logs.shape[2])
+    logs, cells = rig.log_depths, rig.size
+    near = neighbours or everyone(len(rig))
     height, width = (min(_LARGEST * g, max(p, g)) for p, g in zip(photos[0].shape, cells, strict=True))
     if min(height, width) < _SMALLEST:
-        return maps
+        return rig
     guides = [resized(photo, cells).astype(np.float32) for photo in photos]
-    pictures = _Pictures.of(photos, (height, width), Ks, cells)
+    pictures = _Pictures.of(photos, (height, width), rig.Ks, cells)
 
     def corrected(view: int) -> Tensor:
         own, others = logs[view].cpu(), near[view]
@@ -141,15 +137,14 @@ def registered(
             known = _Known.of(pictures.grey(view))
             for other in others[:partners]:
                 check()
-                pose = (viewmats[other] @ invert_rigid(viewmats[view])).cpu()
+                pose = (rig.viewmats[other] @ invert_rigid(rig.viewmats[view])).cpu()
                 change, counts = pictures.compared(view, other, depths, known, pose)
                 target += _cells(counts * change, cells)
                 weight += _cells(counts, cells)
             own = own + smooth(target, weight, own, guides[view])
         return own.to(logs)
 
-    found = [each(view, partial(corrected, view)) for view in range(len(logs))]
-    return DepthMaps(torch.stack(found), maps.log_errors)
+    return rig.with_logs(torch.stack([each(view, partial(corrected, view)) for view in range(len(rig))]))
 
 
 @dataclass(frozen=True)
