@@ -22,21 +22,11 @@ from torch import Tensor
 from torch.nn import functional as F
 
 from langflash_core.rig.rig import Rig
+from langflash_core.rig.settings import CHOICE, Choice
 
 Neighbours = Sequence[Sequence[int]]
 """Of each photo the others that it is compared with."""
 By = Literal["all", "sight", "angle"]
-
-PARTNERS = 4
-"""Of each photo, by the angle."""
-_ASKED = 16  # photos that are asked about one photo's points
-_TRIED = 67  # of whose points one is looked for in the others
-_STEP = 8  # pixels between sampled points
-_SURFACE = 0.3  # log depth by which the other map may differ and still show the point
-_FULL, _BEST, _FALL = 8.0, 9.0, 8.0  # degrees: worth grows up to the first, falls beyond the second
-_APART = 4.0  # degrees between two neighbours, from which on they say different things
-_ENOUGH = 0.15  # worth that a point has from the start: what more of the same adds to it
-_LEAST = 0.01  # of gain a point, for a neighbour
 
 
 def everyone(num_views: int) -> Neighbours:
@@ -44,7 +34,9 @@ def everyone(num_views: int) -> Neighbours:
     return [[other for other in range(num_views) if other != view] for view in range(num_views)]
 
 
-def neighbours(rig: Rig, view: int, by: By = "angle", most: int | None = None) -> list[int]:
+def neighbours(
+    rig: Rig, view: int, by: By = "angle", most: int | None = None, settings: Choice = CHOICE
+) -> list[int]:
     """The photos that one is compared with.
 
     Args:
@@ -55,55 +47,68 @@ def neighbours(rig: Rig, view: int, by: By = "angle", most: int | None = None) -
     if by == "all" or (by == "angle" and len(rig) <= 2):
         return list(everyone(len(rig))[view])
     if by == "sight":
-        return witnesses(rig, view, rig.points(view), _ASKED if most is None else most)
-    return _greedy(*_worth(rig, view), PARTNERS if most is None else most)
+        return witnesses(rig, view, rig.points(view), most, settings=settings)
+    return _greedy(
+        *_worth(rig, view, settings=settings), settings.partners if most is None else most, settings=settings
+    )
 
 
-def source_views(rig: Rig, by: By = "angle", most: int | None = None) -> Neighbours:
+def source_views(
+    rig: Rig, by: By = "angle", most: int | None = None, settings: Choice = CHOICE
+) -> Neighbours:
     """Of each photo its `neighbours`."""
-    return [neighbours(rig, view, by, most) for view in range(len(rig))]
+    return [neighbours(rig, view, by, most, settings=settings) for view in range(len(rig))]
 
 
-def witnesses(rig: Rig, view: int, points: Float[Tensor, "3 n"], most: int = _ASKED) -> list[int]:
+def witnesses(
+    rig: Rig, view: int, points: Float[Tensor, "3 n"], most: int | None = None, settings: Choice = CHOICE
+) -> list[int]:
     """`neighbours` by sight, where a photo's points (3, n) in the world are known."""
+    most = settings.asked if most is None else most
     others = [other for other in range(len(rig)) if other != view]
     if len(others) <= most:
         return others
-    inside = rig.project(points[:, _TRIED // 2 :: _TRIED], slice(None)).inside
+    inside = rig.project(points[:, settings.tried // 2 :: settings.tried], slice(None)).inside
     seeing = [other for other, sees in enumerate(inside.any(1).tolist()) if sees and other != view]
     if len(seeing) <= most:
         return seeing
     return [seeing[(2 * k + 1) * len(seeing) // (2 * most)] for k in range(most)]
 
 
-def _worth(rig: Rig, view: int) -> tuple[Float[Tensor, "V n"], Float[Tensor, "V n 3"]]:
+def _worth(
+    rig: Rig, view: int, settings: Choice = CHOICE
+) -> tuple[Float[Tensor, "V n"], Float[Tensor, "V n 3"]]:
     """What a photo's points are worth in every photo, in [0, 1], 0 in its own; and unit vectors from every
     photo to them."""
-    sparse = (slice(_STEP // 2, None, _STEP), slice(_STEP // 2, None, _STEP))
+    sparse = (slice(settings.step // 2, None, settings.step), slice(settings.step // 2, None, settings.step))
     points = rig.in_world(rig.in_camera(view)[sparse].flatten(0, 1).T, view)
     towards = F.normalize(points.T - rig.poses[:, None, :3, 3], dim=-1)
     cosines = (towards * towards[view]).sum(-1).clamp(-1, 1)
     angles = torch.rad2deg(torch.acos(cosines))
-    worth = (angles / _FULL).clamp(max=1) * torch.exp(-(((angles - _BEST).clamp_min(0) / _FALL) ** 2))
+    worth = (angles / settings.full).clamp(max=1) * torch.exp(
+        -(((angles - settings.best).clamp_min(0) / settings.fall) ** 2)
+    )
     there = rig.project(points, slice(None))
     gap = there.z.clamp_min(1e-6).log() - there.looked_up(rig.log_depths.flatten(1))
-    worth = torch.where(there.inside & (gap.abs() < _SURFACE), worth, 0.0)
+    worth = torch.where(there.inside & (gap.abs() < settings.surface), worth, 0.0)
     worth[view] = 0
     return worth, towards
 
 
-def _greedy(worth: Float[Tensor, "V n"], towards: Float[Tensor, "V n 3"], count: int) -> list[int]:
+def _greedy(
+    worth: Float[Tensor, "V n"], towards: Float[Tensor, "V n 3"], count: int, settings: Choice = CHOICE
+) -> list[int]:
     """At most so many photos by worth, each for the gain in the sum of log worth over the points; to what one
     says others add as much as they see it from elsewhere."""
     chosen: list[int] = []
-    had = torch.full_like(worth, _ENOUGH)
+    had = torch.full_like(worth, settings.enough)
     for _ in range(min(count, len(worth) - 1)):
         gains = torch.log1p(worth / had).mean(1)
         gains[chosen] = 0
         best = int(gains.argmax())
-        if gains[best] <= _LEAST:
+        if gains[best] <= settings.least:
             break
         chosen.append(best)
         angles = torch.rad2deg(torch.acos((towards * towards[best]).sum(-1).clamp(-1, 1))).nan_to_num()
-        had = had + worth[best] * torch.exp(-((angles / _APART) ** 2))
+        had = had + worth[best] * torch.exp(-((angles / settings.apart) ** 2))
     return chosen

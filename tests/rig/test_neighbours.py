@@ -6,13 +6,14 @@ import torch
 from torch import Tensor
 
 from langflash_core.geometry.cameras import intrinsics_from_fov, rays
-from langflash_core.rig.neighbours import PARTNERS, Neighbours, everyone, neighbours, source_views
+from langflash_core.rig.neighbours import Neighbours, everyone, neighbours, source_views
 from langflash_core.rig.rig import Rig
+from langflash_core.rig.settings import CHOICE
 
 WIDTH, HEIGHT, WALL = 84, 63, 3.0
 
 
-def partners(logs: Tensor, viewmats: Tensor, Ks: Tensor, count: int = PARTNERS) -> Neighbours:
+def partners(logs: Tensor, viewmats: Tensor, Ks: Tensor, count: int = CHOICE.partners) -> Neighbours:
     return source_views(Rig.of_logs(logs, viewmats, Ks), "angle", count)
 
 
@@ -58,7 +59,7 @@ def test_partners_lie_on_both_sides():
     near = partners(*ring([0.0, 9.0, 10.0, 11.0, 12.0, 13.0, -10.0]), count=2)
     logs, viewmats, Ks = ring([0.0, 9.0, 10.0, 11.0, 12.0, 13.0, -10.0])
     assert len(near[0]) == 2 and 0 not in near[0]
-    assert all(len(of) <= PARTNERS and len(set(of)) == len(of) for of in partners(logs, viewmats, Ks))
+    assert all(len(of) <= CHOICE.partners and len(set(of)) == len(of) for of in partners(logs, viewmats, Ks))
 
 
 def test_partners_do_not_stand_together():

@@ -2,6 +2,8 @@
 sweep, each a plain function of a rig to a rig. Nothing here is learned."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 import torch
@@ -16,32 +18,65 @@ from langflash_core.network.stereo.registration import registered
 from langflash_core.network.stereo.sharpening import sharpened
 from langflash_core.rig.neighbours import source_views
 from langflash_core.rig.rig import Rig
+from langflash_core.rig.settings import (
+    AGREEMENT,
+    CHOICE,
+    FLATTENING,
+    PLANE_SWEEP,
+    REGISTRATION,
+    SHARPENING,
+    Agreement,
+    Choice,
+    Flattening,
+    PlaneSweep,
+    Registration,
+    Sharpening,
+)
 from langflash_core.running import Run
 from langflash_core.types import Views
 
 _SWEPT = 0.3  # of the time of refinement, before photos are registered one by one
 
 
-def one_surface(rig: Rig, guessed: Sequence[int], views: Views, run: Run) -> Rig:
+@dataclass(frozen=True)
+class Surfaces:
+    """Settings of all stages after the sweep."""
+
+    sharpening: Sharpening = SHARPENING
+    flattening: Flattening = FLATTENING
+    choice: Choice = CHOICE
+    agreement: Agreement = AGREEMENT
+    plane_sweep: PlaneSweep = PLANE_SWEEP
+    registration: Registration = REGISTRATION
+
+
+SURFACES = Surfaces()
+
+
+def one_surface(
+    rig: Rig, guessed: Sequence[int], views: Views, run: Run, settings: Surfaces = SURFACES
+) -> Rig:
     """The rig with depth that has the photos' edges and planes; where places are known, it also agrees
     between photos, to a fraction of their pixels, and has what it had missed.
 
     Args:
         guessed: photos whose place is not known. views: the photos at their own size, where it is at hand.
     """
-    rig = flatten(sharpen(rig))
+    rig = flatten(sharpen(rig, settings.sharpening), settings.flattening)
     placed = [view for view in range(len(rig)) if view not in guessed]
     if len(placed) < 2:
         return rig
     log_depths, greys = rig.log_depths.clone(), grey_photos(views)
-    log_depths[placed] = _settled(rig.some(placed), [greys[view] for view in placed], run).log_depths
+    settled = _settled(rig.some(placed), [greys[view] for view in placed], run, settings)
+    log_depths[placed] = settled.log_depths
     return rig.with_logs(log_depths)
 
 
-def _settled(rig: Rig, greys: Sequence[np.ndarray], run: Run) -> Rig:
+def _settled(rig: Rig, greys: Sequence[np.ndarray], run: Run, settings: Surfaces) -> Rig:
     """Photos whose places are known."""
-    near = source_views(rig)
-    rig = sharpen(searched(agreed(rig, near), greys, near, run.check))
+    near = source_views(rig, settings=settings.choice)
+    rig = searched(agreed(rig, near, settings.agreement), greys, near, run.check, settings.plane_sweep)
+    rig = sharpen(rig, settings.sharpening)
     told = run.counted("refinement", "photo", range(len(rig)), _SWEPT)
 
     def each(view: int, make: Callable[[], Tensor]) -> Tensor:
@@ -49,18 +84,19 @@ def _settled(rig: Rig, greys: Sequence[np.ndarray], run: Run) -> Rig:
         found = run.kept(f"depth-{view}", lambda: {"log_depths": make().cpu().numpy()})
         return torch.from_numpy(np.array(found["log_depths"])).to(rig.depths)
 
-    return flatten(registered(rig, greys, near, run.check, each))
+    rig = registered(rig, greys, near, run.check, each, settings.registration)
+    return flatten(rig, settings.flattening)
 
 
-def sharpen(rig: Rig) -> Rig:
+def sharpen(rig: Rig, settings: Sharpening = SHARPENING) -> Rig:
     """Edges of depth where the photos have them."""
     assert rig.photos is not None, "edges are the photos'"
-    return rig.with_logs(one_by_one(sharpened, rig.log_depths, rig.photos))
+    return rig.with_logs(one_by_one(partial(sharpened, settings=settings), rig.log_depths, rig.photos))
 
 
-def flatten(rig: Rig) -> Rig:
+def flatten(rig: Rig, settings: Flattening = FLATTENING) -> Rig:
     """What is flat within its own uncertainty is flat."""
-    return rig.with_logs(in_groups(flattened, rig.log_depths, rig.log_errors))
+    return rig.with_logs(in_groups(partial(flattened, settings=settings), rig.log_depths, rig.log_errors))
 
 
 def one_by_one(work: Callable[..., Tensor], *of_views: Tensor) -> Tensor:
