@@ -23,10 +23,10 @@ from langflash_core.rig.rig import Rig
 from langflash_core.running import Progress
 from langflash_core.scene.assemble import placed_views, rig_of
 from langflash_core.scene.detailed import assemble_detailed, working_photo, working_size
-from langflash_core.scene.light import Light, photo_light
+from langflash_core.scene.exposure_compensation import ExposureCompensation, compensate_exposure
 from langflash_core.scene.prune import prune
 from langflash_core.scene.report import left_out_line
-from langflash_core.scene.strangers import strangers
+from langflash_core.scene.transients import transient_masks
 from langflash_core.splat.colours import ROUNDS, solved_colours
 from langflash_core.splat.compose import Nearness
 from langflash_core.splat.foreseen import foresight
@@ -51,7 +51,7 @@ class Covered:
     scene: Scene
     photos: "_Photos"
     left: Bool[Tensor, "V H W"]
-    light: Light
+    light: ExposureCompensation
 
 
 @torch.no_grad()
@@ -79,12 +79,12 @@ def covered_scene(
     progress("light", 0.0)
     prediction, views = placed_views(prediction, views)
     rig = rig_of(prediction, views)
-    light = photo_light(rig)
+    light = compensate_exposure(rig)
     grid = (views.images.shape[-2], views.images.shape[-1])
     photos, whole = _Photos(views, light, grid), _Photos(views, light.whole, grid)
     views = replace(views, images=light.corrected(views.images).clamp(0, 1))
     rig = rig_of(prediction, views)  # in the light of all
-    left = strangers(rig)
+    left = transient_masks(rig)
     bare = left | (False if gaussians else ~_with_layers(prediction)[:, None, None])
     scene = assemble_detailed(
         prediction,
@@ -92,7 +92,7 @@ def covered_scene(
         photos,
         detail,
         gaussians=gaussians,
-        strangers=bare if bool(bare.any()) else None,
+        transients=bare if bool(bare.any()) else None,
         preset=preset,
         progress=lambda done: progress("elements", 0.1 + 0.3 * done),
     )
@@ -121,7 +121,7 @@ class _Photos(Sequence[Tensor]):
     """Photos (3, h, w) at their working size, in the light of all; of more than `_HELD` each is decoded anew
     whenever it is asked for."""
 
-    def __init__(self, views: Views, light: Light, grid: tuple[int, int]):
+    def __init__(self, views: Views, light: ExposureCompensation, grid: tuple[int, int]):
         self._views, self._light, self._grid = views, light, grid
         self._known: dict[int, Tensor] = {}
 
@@ -209,7 +209,9 @@ def _with_layers(prediction: Prediction) -> Bool[Tensor, " V"]:
     return torch.zeros(len(poses), dtype=torch.bool).index_fill(0, torch.tensor(kept), True)
 
 
-def _coloured(scene: Scene, photos: _Silent, light: Light, progress: Callable[[float], None]) -> Scene:
+def _coloured(
+    scene: Scene, photos: _Silent, light: ExposureCompensation, progress: Callable[[float], None]
+) -> Scene:
     """Each photo's layer in the colours that make that photo (3, h, w) again; the record says how near they
     come.
 

@@ -2,7 +2,7 @@
 know no layers. Of several layers that show a surface one keeps it; the scene itself loses nothing.
 
 Each layer is drawn from its own photo's place, and of these depth maps it is decided which photo covers which
-surface (`scene.ownership`): a Gaussian goes where its cell belongs to another photo, or is seen through. What
+surface (`scene.view_selection`): a Gaussian goes where its cell is another photo's, or is seen through. What
 stays takes the colours that make the pictures of all layers again: solved for in each (`splat.colours`), and
 of these the mean, by what a Gaussian contributes to each. (Of nine photos of a film, frames between: solved
 for in all pictures together 25.4 dB and .36 of their structure, the mean 25.9 and .42.)
@@ -21,7 +21,7 @@ from langflash_core.geometry.cameras import invert_rigid
 from langflash_core.geometry.harmonics import colour_to_sh, sh_to_colour
 from langflash_core.rig.rig import Rig
 from langflash_core.scene.consistency import outvoted, seen_through
-from langflash_core.scene.ownership import filled, owned
+from langflash_core.scene.view_selection import fill_uncovered, select_views
 from langflash_core.splat.colours import Solved, solved_colours
 from langflash_core.splat.compose import DEPTH
 from langflash_core.splat.mixing import mixing
@@ -156,4 +156,4 @@ def covering(rig: Rig, usable: Bool[Tensor, "V H W"]) -> Bool[Tensor, "V H W"]:
         rig: with confidences. usable: where depths show something.
     """
     through, between = seen_through(rig), outvoted(rig)
-    return filled(rig, owned(rig, usable & ~through & ~between), usable, between)
+    return fill_uncovered(rig, select_views(rig, usable & ~through & ~between), usable, between)

@@ -29,8 +29,8 @@ from langflash_core.geometry.quaternions import matrices_to_quats
 from langflash_core.geometry.surfels import ellipses, spans
 from langflash_core.rig.projected import project_points
 from langflash_core.scene.assemble import sparse_weights
+from langflash_core.scene.exposure_compensation import GAIN_RANGE, LARGEST_OFFSET
 from langflash_core.scene.joining import appended
-from langflash_core.scene.light import GAIN_RANGE, LARGEST_OFFSET
 from langflash_core.types import Camera, Gaussians, Scene
 
 from .looks import Render, mattes

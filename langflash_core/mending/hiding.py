@@ -120,7 +120,7 @@ def hide(
     done = appended(kept, made).with_record(others={})
     told("photos", 0.6)
     if hiding.photos:
-        masks = [mask | _strangers(scene, view, hiding, render) for view, mask in enumerate(masks)]
+        masks = [mask | _transients(scene, view, hiding, render) for view, mask in enumerate(masks)]
     done, shares = _with_photos(done, masks, hiding, render)
     report = Hidden(
         hiding.how, int(members.sum()), int(rows.sum() - members.sum()), len(made.gaussians), side, shares,
@@ -218,7 +218,7 @@ def _pinned(notes: list[dict], scene: Scene, rows: Tensor) -> list[bool]:
     return found
 
 
-def _strangers(scene: Scene, view: int, hiding: Hiding, render: Render) -> np.ndarray:
+def _transients(scene: Scene, view: int, hiding: Hiding, render: Render) -> np.ndarray:
     """(H, W) bool: what a photo shows that was left out of the scene, where anything of that photo was."""
     shares = scene.record.left_out.get("shares", ())
     if not scene.photos or view >= len(shares) or not shares[view]:

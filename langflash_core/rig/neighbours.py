@@ -49,7 +49,7 @@ def neighbours(
     if by == "sight":
         return witnesses(rig, view, rig.points(view), most, settings=settings)
     return _greedy(
-        *_worth(rig, view, settings=settings), settings.partners if most is None else most, settings=settings
+        *_worth(rig, view, settings=settings), settings.sources if most is None else most, settings=settings
     )
 
 

@@ -167,7 +167,7 @@ SHARPENING = Sharpening()
 class Choice:
     """Which photos a photo is compared with (`rig.neighbours`)."""
 
-    partners: int = 4
+    sources: int = 4
     """Of each photo, by the angle."""
     asked: int = 16
     """Photos that are asked about one photo's points."""

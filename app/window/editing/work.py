@@ -18,7 +18,7 @@ from langflash_core.scene.edits import Combine, Marks
 from langflash_core.scene.mask import Mask
 
 from ..commands import Command, Notify
-from ..requests import Asked, SceneErrand
+from ..requests import Asked, SceneTask
 from ..scene.memory import SceneMemory
 from ..scene.state import SceneInfo
 from ..state import State
@@ -48,7 +48,7 @@ WORDS_ASKED, WORDS_OF_ATOM = 6, 3
 
 
 @dataclass(frozen=True)
-class EditErrand(SceneErrand):
+class EditTask(SceneTask):
     """About a scene as its marks show it."""
 
     memory: SceneMemory = field(repr=False)
@@ -80,7 +80,7 @@ class EditErrand(SceneErrand):
 
 
 @dataclass(frozen=True)
-class Selection(EditErrand):
+class Selection(EditTask):
     """Something looks for Gaussians and waits for it."""
 
     def failed(self, sentence: str) -> Iterable[Command]:
@@ -264,7 +264,7 @@ class GrowSelection(Selection):
 
 
 @dataclass(frozen=True)
-class ScoreFloaters(EditErrand):
+class ScoreFloaters(EditTask):
     """The strength of cleaning from which every Gaussian goes, and what else a recipe finds. Where it cannot
     be followed, nothing goes."""
 
@@ -311,7 +311,7 @@ class ScoreFloaters(EditErrand):
 
 
 @dataclass(frozen=True)
-class FindMargins(EditErrand):
+class FindMargins(EditTask):
     """The margin from which on every Gaussian is hidden with the selection."""
 
     newest_counts = True
@@ -379,7 +379,7 @@ def _phrase(state: State, info: SceneInfo, marks: Marks, key: int, combine: Comb
 
 
 @dataclass(frozen=True)
-class Weigh(EditErrand):
+class Weigh(EditTask):
     """The groups of a pixel whose weight maps are not drawn. size: of the picture's place."""
 
     newest_counts = True
@@ -450,7 +450,7 @@ class NamePlace(Weigh):
 
 
 @dataclass(frozen=True)
-class NameAtoms(EditErrand):
+class NameAtoms(EditTask):
     """The nearest household words of every atom."""
 
     def run(self, stopping: Asked) -> Iterator[Command]:
@@ -462,7 +462,7 @@ class NameAtoms(EditErrand):
 
 
 @dataclass(frozen=True)
-class KeepLessons(EditErrand):
+class KeepLessons(EditTask):
     """Add what was taught in the scene to the person's own vocabulary."""
 
     path: Path
@@ -483,7 +483,7 @@ class KeepLessons(EditErrand):
 
 
 @dataclass(frozen=True)
-class FindLessons(EditErrand):
+class FindLessons(EditTask):
     """Which groups look like what was taught in other scenes."""
 
     path: Path

@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float
 
-from langflash_core.network.stereo.bundle import Bundle, Rig, adjusted_bundle
+from langflash_core.network.stereo.bundle import Bundle, Optics, adjusted_bundle
 from langflash_core.network.stereo.graph import Placed
 from langflash_core.network.stereo.inputs import (
     PoseInput,
@@ -154,9 +154,9 @@ def _with_bends(
     """The lenses (G,) with their bends, where photos show some: adjusted again, from straight lines on."""
     tracks = thinned(_tracks(views, points, agreed), _OBSERVATIONS[-1])
     focals = np.array([view.K[0, 0] for view in views])
-    rig = Rig(focals, lenses, doubts / _SHARED, np.where(doubts > 0, _BEND_DOUBT / _SHARED, 0.0))
+    optics = Optics(focals, lenses, doubts / _SHARED, np.where(doubts > 0, _BEND_DOUBT / _SHARED, 0.0))
     depths = log_depths(views, tracks)
-    bent = adjusted_bundle(straight.viewmats, np.zeros(len(views)), straight.growths, rig, tracks, depths)
+    bent = adjusted_bundle(straight.viewmats, np.zeros(len(views)), straight.growths, optics, tracks, depths)
     errors = bent.bend_errors * _SHARED
     corners = np.zeros(len(doubts))  # |q| there
     for view, lens in zip(views, lenses, strict=True):
@@ -194,7 +194,7 @@ def _adjusted(
         if not len(tracks):
             return None
         depths = log_depths(views, tracks)
-        bundle = adjusted_bundle(viewmats, logs, growths, Rig(focals, lenses, doubts), tracks, depths)
+        bundle = adjusted_bundle(viewmats, logs, growths, Optics(focals, lenses, doubts), tracks, depths)
         viewmats, growths = bundle.viewmats, bundle.growths
         matches = _agreeing(views, points, viewmats, np.exp(growths[lenses]), start.missing, agreed)
     assert bundle is not None

@@ -19,7 +19,7 @@ from langflash_core.network.stereo.matching import RelativePose
 Pairs = Mapping[tuple[int, int], RelativePose]
 """Relative poses by views i < j."""
 
-_PARTNERS = 4  # of each photo, whose pairs are looked at
+_SOURCES = 4  # of each photo, whose pairs are looked at
 NEIGHBOURS = 3
 """Of each photo, with which its depth is compared."""
 _LOOP = 4.0  # degrees within which the turns around a triangle must close to confirm its edges
@@ -48,13 +48,13 @@ def chosen_pairs(
 ) -> list[tuple[int, int]]:
     """The pairs to look at: those of each photo with the most matches, and a tree that connects all."""
     counts = {edge: len(rows) for edge, rows in matches.items()}
-    best = closest(num_views, counts, _PARTNERS)
+    best = closest(num_views, counts, _SOURCES)
     chosen = {edge for edge in counts if edge[1] in best[edge[0]] or edge[0] in best[edge[1]]}
     return sorted(chosen | set(_tree(num_views, counts)))
 
 
 def closest(
-    num_views: int, counts: Mapping[tuple[int, int], int], partners: int = NEIGHBOURS
+    num_views: int, counts: Mapping[tuple[int, int], int], most: int = NEIGHBOURS
 ) -> tuple[tuple[int, ...], ...]:
     """Of each view so many others that share most with it, the first of equal ones first."""
     found = []
@@ -62,7 +62,7 @@ def closest(
         shared = sorted(
             (-count, sum(edge) - view) for edge, count in counts.items() if view in edge and count
         )
-        found.append(tuple(other for _, other in shared[:partners]))
+        found.append(tuple(other for _, other in shared[:most]))
     return tuple(found)
 
 

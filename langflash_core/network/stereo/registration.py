@@ -113,11 +113,11 @@ def registered(
 
     def corrected(view: int) -> Tensor:
         own, others = logs[view].cpu(), near[view]
-        for partners in settings.rounds if len(others) > 1 else (1,):
+        for most in settings.rounds if len(others) > 1 else (1,):
             target, weight = torch.zeros(2, *cells)
             depths = F.interpolate(own[None, None], size=pictures.size, mode="bilinear")[0, 0]
             known = _Known.of(pictures.grey(view), settings)
-            for other in others[:partners]:
+            for other in others[:most]:
                 check()
                 pose = (rig.viewmats[other] @ invert_rigid(rig.viewmats[view])).cpu()
                 change, counts = pictures.compared(view, other, depths, known, pose, settings=settings)

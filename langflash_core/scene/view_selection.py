@@ -35,7 +35,7 @@ _BORDER = 2  # cells, at the border of a photo that leads, that take nothing ove
 _FINER = 2.0  # area that a pixel of the earlier photo covers over that of a later one which takes it over
 
 
-def owned(rig: Rig, known: Bool[Tensor, "V H W"] | None = None) -> Bool[Tensor, "V H W"]:
+def select_views(rig: Rig, known: Bool[Tensor, "V H W"] | None = None) -> Bool[Tensor, "V H W"]:
     """(V, H, W) bool: the cells of each photo that it covers itself.
 
     Args:
@@ -62,7 +62,7 @@ def owned(rig: Rig, known: Bool[Tensor, "V H W"] | None = None) -> Bool[Tensor, 
             finest = torch.where(takes, area, finest)
             mine = takes if other == view else mine & ~takes
         keep[view] = mine.view_as(keep[view])
-    return filled(rig, _closed(keep) & known, known)
+    return fill_uncovered(rig, _closed(keep) & known, known)
 
 
 def _takers(known: Tensor, first: list[int]) -> Tensor:
@@ -77,7 +77,7 @@ def _takers(known: Tensor, first: list[int]) -> Tensor:
     return takers
 
 
-def filled(
+def fill_uncovered(
     rig: Rig,
     keep: Bool[Tensor, "V H W"],
     known: Bool[Tensor, "V H W"],
@@ -87,9 +87,9 @@ def filled(
     one's cells count as kept for those after it, so that many photos do not all fill one gap.
 
     Args:
-        keep, known: (V, H, W) bool, as `owned`. anything: as `covered`.
+        keep, known: (V, H, W) bool, as `select_views`. anything: as `find_covered`.
     """
-    bare, found = known & ~covered(rig, keep, anything), keep.clone()
+    bare, found = known & ~find_covered(rig, keep, anything), keep.clone()
     before = rig.depths.new_zeros(3, 0)
     for view in from_the_middle(rig.depths, rig.viewmats):
         if not bool(bare[view].any()):
@@ -100,7 +100,7 @@ def filled(
     return found
 
 
-def covered(
+def find_covered(
     rig: Rig, keep: Bool[Tensor, "V H W"], anything: Bool[Tensor, "V H W"] | None = None
 ) -> Bool[Tensor, "V H W"]:
     """(V, H, W) bool: cells of each photo in which, or beside which, what is kept lies at about their depth

@@ -47,7 +47,7 @@ BLOCK = 4  # pixels a side
 EXPOSED = (0.03, 0.97)  # sRGB values that the sensor and the curve still tell apart
 AGREES = 0.05  # relative difference of depths that show one surface
 CONFIDENT = 1 / 3  # an expected error of a fifth of the depth and less
-PARTNERS = 5  # photos that each is compared with
+SOURCES = 5  # photos that each is compared with
 SIGMA = 0.05  # difference from which a pair speaks less and less
 _SIGMAS = (0.4, 0.4, 0.2, 0.2, 0.1, 0.1) + 10 * (SIGMA,)  # step after step
 ALIKE = 0.5
@@ -60,7 +60,7 @@ _COARSE = 4  # every so many blocks of a row and of a column tell which photos o
 
 
 @dataclass(frozen=True)
-class Light:
+class ExposureCompensation:
     """gains, offsets (V, 3): what brings each photo's red, green and blue to the light of all.
 
     Raises:
@@ -91,10 +91,10 @@ class Light:
         return low, (self.gains + self.offsets).amax(0).clamp_min(1)
 
     @property
-    def whole(self) -> "Light":
+    def whole(self) -> "ExposureCompensation":
         """The same light with all its span in [0, 1], so that nothing of a photo is clipped."""
         low, high = self.span
-        return Light(self.gains / (high - low), (self.offsets - low) / (high - low))
+        return ExposureCompensation(self.gains / (high - low), (self.offsets - low) / (high - low))
 
     def corrected(
         self, images: Float[Tensor, "*V 3 H W"], view: int | None = None
@@ -135,7 +135,7 @@ class Pairs:
     counted: Bool[Tensor, "E 3 P"]
 
 
-def photo_light(rig: Rig) -> Light:
+def compensate_exposure(rig: Rig) -> ExposureCompensation:
     """The gains and offsets that bring photos of one scene to one light.
 
     Args:
@@ -147,11 +147,11 @@ def photo_light(rig: Rig) -> Light:
         photo that shares nothing with others.
     """
     with torch.no_grad():
-        return light_of(compared(rig.map(lambda values: values.detach().cpu().float())), len(rig))
+        return solve_compensation(compared(rig.map(lambda values: values.detach().cpu().float())), len(rig))
 
 
 def compared(rig: Rig) -> Pairs:
-    """The pairs that `photo_light` compares, float32 in."""
+    """The pairs that `compensate_exposure` compares, float32 in."""
     num_views = len(rig)
     if num_views < 2 or min(rig.size) < BLOCK:
         return _no_pairs()
@@ -160,7 +160,7 @@ def compared(rig: Rig) -> Pairs:
     for view in range(num_views):
         _, agrees = _carried(blocks, blocks.points[:, blocks.coarse], rig, view)
         shared[:, view] = (agrees & _confident(blocks.own[..., blocks.coarse])).sum(-1)
-    firsts, seconds = partners(shared)
+    firsts, seconds = source_pairs(shared)
     parts = []
     for view in seconds.unique().tolist():
         chosen = firsts[seconds == view]
@@ -210,8 +210,8 @@ def _confident(own: Tensor) -> Tensor:
     return own[:, 7] > CONFIDENT
 
 
-def partners(shared: Int[Tensor, "V V"]) -> tuple[Int[Tensor, " E"], Int[Tensor, " E"]]:
-    """Ordered pairs of photos to compare: each with the `PARTNERS` that it shares most with, and what else it
+def source_pairs(shared: Int[Tensor, "V V"]) -> tuple[Int[Tensor, " E"], Int[Tensor, " E"]]:
+    """Ordered pairs of photos to compare: each with the `SOURCES` that it shares most with, and what else it
     takes to connect what shares anything.
 
     Args:
@@ -222,7 +222,7 @@ def partners(shared: Int[Tensor, "V V"]) -> tuple[Int[Tensor, " E"], Int[Tensor,
     edges = [(i, j) for j in range(len(both)) for i in range(j) if both[i][j]]
     chosen = []
     for i, j in sorted(edges, key=lambda edge: (-both[edge[0]][edge[1]], edge)):
-        if min(degrees[i], degrees[j]) < PARTNERS or part[i] != part[j]:
+        if min(degrees[i], degrees[j]) < SOURCES or part[i] != part[j]:
             chosen += [(i, j), (j, i)]
             degrees[i], degrees[j] = degrees[i] + 1, degrees[j] + 1
             part = [part[i] if own == part[j] else own for own in part]
@@ -230,7 +230,7 @@ def partners(shared: Int[Tensor, "V V"]) -> tuple[Int[Tensor, " E"], Int[Tensor,
     return firsts, seconds
 
 
-def light_of(pairs: Pairs, num_views: int) -> Light:
+def solve_compensation(pairs: Pairs, num_views: int) -> ExposureCompensation:
     """The light of these pairs, found again without photos that no light makes alike."""
     light = _minimum(pairs, num_views)
     alike = _alike(pairs, light)
@@ -240,7 +240,7 @@ def light_of(pairs: Pairs, num_views: int) -> Light:
     return _minimum(Pairs(*kept), num_views)
 
 
-def _alike(pairs: Pairs, light: Light) -> Tensor:
+def _alike(pairs: Pairs, light: ExposureCompensation) -> Tensor:
     """(E,) photos of which most pairs differ by no more than 2 sigma."""
     first, second = (
         colours * light.gains[of][..., None] + light.offsets[of][..., None]
@@ -251,7 +251,7 @@ def _alike(pairs: Pairs, light: Light) -> Tensor:
     return near.sum((1, 2)) >= ALIKE * pairs.counted.sum((1, 2))
 
 
-def _minimum(pairs: Pairs, num_views: int) -> Light:
+def _minimum(pairs: Pairs, num_views: int) -> ExposureCompensation:
     """The minimum of the module's sum over these pairs, by linear least squares that are weighted again."""
     connected = _connected(pairs, num_views)
     gauge = torch.eye(num_views, dtype=torch.float64) - connected / connected.sum(-1, keepdim=True)
@@ -266,7 +266,7 @@ def _minimum(pairs: Pairs, num_views: int) -> Light:
         # 142815), of 96 photos and more.
         found = found + torch.stack([torch.linalg.solve(*own) for own in zip(normal, right, strict=True)])
     logs, offsets = _bounded(found.view(3, num_views, 2), connected).unbind(-1)
-    return Light(logs.exp().T.contiguous(), offsets.T.contiguous())
+    return ExposureCompensation(logs.exp().T.contiguous(), offsets.T.contiguous())
 
 
 def _normal_equations(pairs: Pairs, found: Tensor, sigma: float) -> tuple[Tensor, Tensor]:

@@ -16,7 +16,7 @@ from langflash_core.geometry.cameras import (
     unproject,
 )
 from langflash_core.rig.rig import Rig
-from langflash_core.scene.strangers import _CELL, _Look, strangers
+from langflash_core.scene.transients import _CELL, _Look, transient_masks
 
 WIDTH, HEIGHT = 96, 72
 WALL = 3.0
@@ -37,7 +37,7 @@ class Seen:
         return Rig(self.viewmats, self.Ks, self.depths, photos=self.images)
 
     def found(self) -> Tensor:
-        return strangers(self.rig())
+        return transient_masks(self.rig())
 
 
 def room(thing: tuple[float, ...], shown: tuple[bool, ...], kinds: tuple[int, ...] | None = None) -> Seen:
@@ -136,7 +136,7 @@ def test_photos_that_see_nothing_in_common_say_nothing():
 def test_a_picture_of_one_pixel():
     ones = torch.ones(4, 1, 1)
     cameras = torch.eye(4).repeat(4, 1, 1), torch.eye(3).repeat(4, 1, 1)
-    assert not strangers(Rig(*cameras, ones, photos=ones[:, None].expand(4, 3, 1, 1))).any()
+    assert not transient_masks(Rig(*cameras, ones, photos=ones[:, None].expand(4, 3, 1, 1))).any()
 
 
 def test_what_is_foreseen_is_what_a_plain_loop_finds():

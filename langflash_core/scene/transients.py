@@ -56,7 +56,7 @@ _DEPTHS = (*(k / 20 for k in range(-12, 13)), 0.8, 1.1, 1.6, 2.5)
 """Log depths, by which a region is moved: what is seen through a window or in a mirror is far."""
 
 
-def strangers(rig: Rig) -> Bool[Tensor, "V H W"]:
+def transient_masks(rig: Rig) -> Bool[Tensor, "V H W"]:
     """Pixels of each photo that the others contradict.
 
     Args:
@@ -98,7 +98,7 @@ class _Look:
 
     @staticmethod
     def of(rig: Rig, view: int) -> "_Look":
-        assert rig.photos is not None, "whoever seeks strangers looks at them"
+        assert rig.photos is not None, "whoever seeks transients looks at them"
         (height, width), image = rig.size, rig.photos[view]
         whole = (slice(None), slice(height // _CELL * _CELL), slice(width // _CELL * _CELL))
         cut, side, reach = image[whole], _AROUND * _CELL, (_AROUND - 1) // 2 * _CELL
@@ -237,7 +237,7 @@ def _elsewhere(seed: Tensor, own: _Look, others: list[_Look], faced: Tensor) -> 
 
 def _grown(seeds: Tensor, may: Tensor) -> Tensor:
     """(h, w) bool: seeds, what goes on from there, holes and a margin."""
-    import scipy.ndimage  # a tenth of what is imported for a scene, where few have strangers
+    import scipy.ndimage  # a tenth of what is imported for a scene, where few have transients
 
     grown = scipy.ndimage.binary_dilation(
         seeds.cpu().numpy(), _SQUARE, _FARTHEST, (may | seeds).cpu().numpy()
