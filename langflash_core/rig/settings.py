@@ -192,3 +192,107 @@ class Choice:
 
 
 CHOICE = Choice()
+
+
+@dataclass(frozen=True)
+class Straightening:
+    """Monocular depth that matches straighten (`network.stereo.alignment`)."""
+
+    prior_error: float = 0.08
+    """Log-depth error that no smooth correction removes."""
+    cauchy: float = 2.0
+    """Standard deviations from which a match speaks less and less."""
+    iterations: int = 15
+    """Of least squares that are weighted again."""
+    limit: float = 1.0
+    """Log depth: a correction never exceeds a factor of e."""
+
+
+STRAIGHTENING = Straightening()
+
+
+@dataclass(frozen=True)
+class Graph:
+    """Relative poses of pairs brought together (`network.stereo.graph`)."""
+
+    sources: int = 4
+    """Of each photo, whose pairs are looked at."""
+    loop: float = 4.0
+    """Degrees within which the turns around a triangle must close to confirm its edges."""
+    robust: float = 3.0
+    """Sigmas from which an edge speaks less and less (Geman-McClure)."""
+    agrees: float = 40.0
+    """Square of the gap in sigmas (7 degrees of freedom) up to which an edge is kept."""
+    steps: int = 12
+    """Of Gauss and Newton, at most."""
+    damping: float = 1e-6
+    """Share of the diagonal: views that no edge reaches stay."""
+
+
+GRAPH = Graph()
+
+
+@dataclass(frozen=True)
+class Adjustment:
+    """All photos and lenses adjusted together (`network.stereo.adjustment`)."""
+
+    observations: tuple[int, int] = (150, 400)
+    """Of each view, in the first round and in the second: more change nothing but the time."""
+    sigma: float = 0.4
+    """Pixels at the working size, of a key point."""
+    agrees: float = 2.0
+    """Times the tolerance of pairs, within which matches join once poses are known."""
+    shared: float = 3.0
+    """Standard errors of a lens are so many times those of independent observations: errors of key points
+    depend on what they show, and go together."""
+    known: float = 0.03
+    """Standard error of a focal length, of itself, above which it is not taken."""
+    fields: tuple[float, float] = (20.0, 120.0)
+    """Degrees of the longer side: what photos of rooms are taken with."""
+    bend_doubt: float = 0.15
+    """Standard deviation expected of a bend: action cameras have as much."""
+    bend_sure: float = 3.0
+    """Standard errors from which a bend is one."""
+    bend_seen: float = 4.0
+    """Pixels at the working size by which a bend moves a photo's corner, at least: the focal length makes up
+    for three quarters of that, and key points are sure to the rest."""
+    steepest: float = 0.1
+    """Of a straight lens: what a bent one magnifies a photo's corner along the radius, at least."""
+
+
+ADJUSTMENT = Adjustment()
+
+
+@dataclass(frozen=True)
+class Pairing:
+    """Poses of pairs, and which photos tell a lens first (`network.stereo.poses`)."""
+
+    min_share: float = 0.25
+    """Of the matches, that must agree with a pose."""
+    max_depth_sigma: float = 0.2
+    """Log-depth error beyond which a triangulated match says too little."""
+    min_points: int = 10
+    """Matches needed to correct a map."""
+    few: int = 40
+    """Inliers among key points, below which dense matches are asked as well."""
+    first: int = 8
+    """Photos that tell the lens first."""
+    enough: int = 100
+    """Matches with one of them."""
+    other_lens: float = 0.05
+    """Change of a focal length, as a logarithm, from which pairs are looked at again."""
+    dense_cost: float = 2.75
+    """Cost from which dense matches are not believed: on validation rooms the wrong ones began at 2.8."""
+    checked: int = 4
+    """Pairs of known poses that are sought as well."""
+    bridges: int = 4
+    """Pairs that are asked, at most, to connect two parts: ten place no photo of four walks more."""
+    graph: Graph = GRAPH
+    """How the poses of pairs are brought together."""
+    adjustment: Adjustment = ADJUSTMENT
+    """How all photos are adjusted."""
+    straightening: Straightening = STRAIGHTENING
+    """How their depth maps are corrected."""
+
+
+PAIRING = Pairing()
