@@ -277,8 +277,8 @@ class Prediction:
     @staticmethod
     def of_bent(lenses: tuple[FoundFocal | None, ...], space: str, timings: dict[str, float]) -> "Prediction":
         """Of photos that are to be straightened: no photo, and no group."""
-        none = torch.zeros(0, 0, 0)
-        nothing = none[:, None], torch.zeros(0, 0), space, torch.zeros(0, 4, 4), none, none
+        maps, groups = torch.zeros(0, 0, 0), (torch.zeros(0, 0, 0, 0), torch.zeros(0, 0))
+        nothing = *groups, space, torch.zeros(0, 4, 4), maps, maps
         return Prediction(Gaussians.none(), *nothing, timings=timings, bent=lenses)
 
 

@@ -163,3 +163,9 @@ def test_what_is_kept_hangs_on_photos_and_settings(tmp_path: Path):
     keys.add(keep_of(tmp_path, replace(views, images=views.images + 1 / 255), ("mini", 1)).key)
     keys.add(keep_of(tmp_path, replace(views, Ks=views.Ks * 1.01), ("mini", 1)).key)
     assert len(keys) == 4
+
+
+def test_photos_that_are_to_be_straightened_come_back():
+    given = Prediction.of_bent((None, FoundFocal(1.1, 0.01, 5, -0.05, 0.002)), "minilm", {"poses": 1.0})
+    back = prediction_of(arrays_of(given))
+    assert back.bent == given.bent and back.timings == given.timings and len(back.depths) == 0
