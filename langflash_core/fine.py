@@ -19,13 +19,14 @@ from langflash_core.detail import Detail
 from langflash_core.geometry.cameras import invert_rigid
 from langflash_core.geometry.harmonics import colour_to_sh, sh_to_colour
 from langflash_core.images.views import source_picture, source_size
+from langflash_core.rig.rig import Rig
 from langflash_core.running import Progress
-from langflash_core.scene.assemble import placed_views
+from langflash_core.scene.assemble import placed_views, rig_of
 from langflash_core.scene.detailed import assemble_detailed, working_photo, working_size
-from langflash_core.scene.light import Light, photo_light
+from langflash_core.scene.exposure_compensation import ExposureCompensation, compensate_exposure
 from langflash_core.scene.prune import prune
 from langflash_core.scene.report import left_out_line
-from langflash_core.scene.strangers import strangers
+from langflash_core.scene.transients import transient_masks
 from langflash_core.splat.colours import ROUNDS, solved_colours
 from langflash_core.splat.compose import Nearness
 from langflash_core.splat.foreseen import foresight
@@ -50,7 +51,7 @@ class Covered:
     scene: Scene
     photos: "_Photos"
     left: Bool[Tensor, "V H W"]
-    light: Light
+    light: ExposureCompensation
 
 
 @torch.no_grad()
@@ -77,13 +78,13 @@ def covered_scene(
     start = time.perf_counter()
     progress("light", 0.0)
     prediction, views = placed_views(prediction, views)
-    light = photo_light(
-        views.images, prediction.depths, prediction.confidences, prediction.viewmats, views.Ks
-    )
+    rig = rig_of(prediction, views)
+    light = compensate_exposure(rig)
     grid = (views.images.shape[-2], views.images.shape[-1])
     photos, whole = _Photos(views, light, grid), _Photos(views, light.whole, grid)
     views = replace(views, images=light.corrected(views.images).clamp(0, 1))
-    left = strangers(views.images, prediction.depths, prediction.viewmats, views.Ks)
+    rig = rig_of(prediction, views)  # in the light of all
+    left = transient_masks(rig)
     bare = left | (False if gaussians else ~_with_layers(prediction)[:, None, None])
     scene = assemble_detailed(
         prediction,
@@ -91,11 +92,11 @@ def covered_scene(
         photos,
         detail,
         gaussians=gaussians,
-        strangers=bare if bool(bare.any()) else None,
+        transients=bare if bool(bare.any()) else None,
         preset=preset,
         progress=lambda done: progress("elements", 0.1 + 0.3 * done),
     )
-    foreseen = _foreseen(prediction, views)
+    foreseen = _foreseen(rig)
     timings = {**prediction.timings, "assembly": time.perf_counter() - start}
     return Covered(scene.with_record(foreseen=foreseen, cost=Cost(timings)), whole, left, light)
 
@@ -120,7 +121,7 @@ class _Photos(Sequence[Tensor]):
     """Photos (3, h, w) at their working size, in the light of all; of more than `_HELD` each is decoded anew
     whenever it is asked for."""
 
-    def __init__(self, views: Views, light: Light, grid: tuple[int, int]):
+    def __init__(self, views: Views, light: ExposureCompensation, grid: tuple[int, int]):
         self._views, self._light, self._grid = views, light, grid
         self._known: dict[int, Tensor] = {}
 
@@ -178,11 +179,9 @@ class _Silent(Sequence[Tensor]):
         return self._photos.size(index)
 
 
-def _foreseen(prediction: Prediction, views: Views) -> dict[str, list]:
+def _foreseen(rig: Rig) -> dict[str, list]:
     """What a record says of how much of each photo its neighbours foresee: nothing of a single one."""
-    if views.num_views < 2:
-        return {}
-    return foresight(views.images, prediction.depths, prediction.viewmats, views.Ks).stored()
+    return {} if len(rig) < 2 else foresight(rig).stored()
 
 
 def _shares(left: Tensor) -> dict[str, list[float]]:
@@ -210,7 +209,9 @@ def _with_layers(prediction: Prediction) -> Bool[Tensor, " V"]:
     return torch.zeros(len(poses), dtype=torch.bool).index_fill(0, torch.tensor(kept), True)
 
 
-def _coloured(scene: Scene, photos: _Silent, light: Light, progress: Callable[[float], None]) -> Scene:
+def _coloured(
+    scene: Scene, photos: _Silent, light: ExposureCompensation, progress: Callable[[float], None]
+) -> Scene:
     """Each photo's layer in the colours that make that photo (3, h, w) again; the record says how near they
     come.
 

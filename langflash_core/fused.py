@@ -2,7 +2,7 @@
 know no layers. Of several layers that show a surface one keeps it; the scene itself loses nothing.
 
 Each layer is drawn from its own photo's place, and of these depth maps it is decided which photo covers which
-surface (`scene.ownership`): a Gaussian goes where its cell belongs to another photo, or is seen through. What
+surface (`scene.view_selection`): a Gaussian goes where its cell is another photo's, or is seen through. What
 stays takes the colours that make the pictures of all layers again: solved for in each (`splat.colours`), and
 of these the mean, by what a Gaussian contributes to each. (Of nine photos of a film, frames between: solved
 for in all pictures together 25.4 dB and .36 of their structure, the mean 25.9 and .42.)
@@ -17,10 +17,11 @@ from scipy.spatial import KDTree
 from torch import Tensor
 
 from langflash_core.at_once import at_once
-from langflash_core.geometry.cameras import invert_rigid, pictured, world_points
+from langflash_core.geometry.cameras import invert_rigid
 from langflash_core.geometry.harmonics import colour_to_sh, sh_to_colour
+from langflash_core.rig.rig import Rig
 from langflash_core.scene.consistency import outvoted, seen_through
-from langflash_core.scene.ownership import filled, owned
+from langflash_core.scene.view_selection import fill_uncovered, select_views
 from langflash_core.splat.colours import Solved, solved_colours
 from langflash_core.splat.compose import DEPTH
 from langflash_core.splat.mixing import mixing
@@ -91,14 +92,13 @@ def fused_rows(scene: Scene) -> Bool[Tensor, " N"]:
     if not len(views):
         return rows
     depths, alphas = _own_depths(scene, views.tolist())
-    viewmats, Ks = scene.viewmats[views].float(), scene.Ks[views].float()
-    keep = covering(depths, viewmats, Ks, alphas >= _SHOWN, alphas)
+    rig = Rig(scene.viewmats[views].float(), scene.Ks[views].float(), depths, alphas)
+    keep = covering(rig, alphas >= _SHOWN)
     for number, view in enumerate(views.tolist()):
         own = (scene.view_ids == view).nonzero().squeeze(1)
-        points = scene.gaussians.means[own].float().T.contiguous()
-        x, y, _ = pictured(scene.viewmats[view].float(), scene.Ks[view].float(), points)
-        column = x.nan_to_num(0).floor().long().clamp(0, width - 1)
-        line = y.nan_to_num(0).floor().long().clamp(0, height - 1)
+        there = rig.project(scene.gaussians.means[own].float().T.contiguous(), number)
+        column = there.x.nan_to_num(0).floor().long().clamp(0, width - 1)
+        line = there.y.nan_to_num(0).floor().long().clamp(0, height - 1)
         rows[own] = keep[number][line, column]
     return rows
 
@@ -149,20 +149,11 @@ def _own_depths(scene: Scene, views: list[int]) -> tuple[Float[Tensor, "L H W"],
     return torch.stack(depths), torch.stack(alphas)
 
 
-def covering(
-    depths: Float[Tensor, "V H W"],
-    viewmats: Float[Tensor, "V 4 4"],
-    Ks: Float[Tensor, "V 3 3"],
-    usable: Bool[Tensor, "V H W"],
-    trusts: Float[Tensor, "V H W"],
-) -> Bool[Tensor, "V H W"]:
+def covering(rig: Rig, usable: Bool[Tensor, "V H W"]) -> Bool[Tensor, "V H W"]:
     """(V, H, W) bool: the cells that each photo covers itself where all make one surface.
 
     Args:
-        depths: (V, H, W) > 0. usable: where they show something. trusts: how sure they are, in [0, 1].
+        rig: with confidences. usable: where depths show something.
     """
-    points = world_points(depths, viewmats, Ks)
-    through = seen_through(points.flatten(0, 1), viewmats, Ks, depths, trusts).view_as(usable)
-    between = outvoted(points, viewmats, Ks, depths)
-    keep = owned(depths, viewmats, Ks, usable & ~through & ~between)
-    return filled(depths, viewmats, Ks, keep, usable, between)
+    through, between = seen_through(rig), outvoted(rig)
+    return fill_uncovered(rig, select_views(rig, usable & ~through & ~between), usable, between)

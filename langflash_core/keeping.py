@@ -19,7 +19,7 @@ from langflash_core.files import written_atomically
 
 Arrays = Mapping[str, np.ndarray]
 Made = Callable[[], Arrays]
-STEPS = 1
+STEPS = 2
 """Raised whenever a step comes to mean something else: what an older program kept is then made anew."""
 MATCHES = "matches"
 """The step that finds key points and what corresponds: begun ahead, asked for by the network."""

@@ -8,7 +8,7 @@ import torch
 from torch import Tensor
 
 from langflash_core.keeping import Arrays
-from langflash_core.records import FoundLens
+from langflash_core.records import FoundFocal, FoundLens
 from langflash_core.types import Gaussians, Prediction
 
 _SAID = "said"
@@ -24,6 +24,7 @@ def arrays_of(prediction: Prediction) -> Arrays:
         "warnings": prediction.warnings,
         "timings": prediction.timings,
         "lenses": [asdict(lens) for lens in prediction.lenses],
+        "bent": [lens and asdict(lens) for lens in prediction.bent],
     }
     found = {_SAID: np.frombuffer(json.dumps(said).encode(), np.uint8)}
     for name in _TENSORS:
@@ -53,5 +54,6 @@ def prediction_of(arrays: Arrays) -> Prediction:
         warnings=tuple(said["warnings"]),
         timings=said["timings"],
         lenses=tuple(FoundLens(**lens) for lens in said["lenses"]),
+        bent=tuple(lens and FoundFocal(**lens) for lens in said["bent"]),
         **tensors,
     )

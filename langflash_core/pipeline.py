@@ -107,10 +107,10 @@ def reconstruct(
         Cancelled: `cancelled()` became true.
     """
     from langflash_core.reconstruction.networks import Networks
+    from langflash_core.reconstruction.options import Options
     from langflash_core.reconstruction.stages import STAGES, scene_of
-    from langflash_core.reconstruction.wishes import Wishes
 
-    wishes = Wishes(
+    options = Options(
         photos,
         preset=preset,
         weights=weights,
@@ -128,7 +128,7 @@ def reconstruct(
         keep=None if keep is None else Path(keep),
     )
     run = Run(STAGES, progress, cancelled)
-    return scene_of(wishes, run, Networks() if networks is None else networks, ahead)
+    return scene_of(options, run, Networks() if networks is None else networks, ahead)
 
 
 def query(

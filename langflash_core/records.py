@@ -33,17 +33,6 @@ class FoundFocal:
     bend_error: float = 0.0
 
 
-class BentLens(Exception):
-    """Photos bend straight lines, so they are to be straightened before they are looked at again.
-
-    found: of each lens what was found, None: nothing.
-    """
-
-    def __init__(self, found: tuple[FoundFocal | None, ...]):
-        super().__init__("photos are to be straightened")
-        self.found = found
-
-
 @dataclass(frozen=True)
 class FoundLens:
     """What photos told of the lens that they were taken with.
@@ -181,10 +170,10 @@ class Record:
     back where they are written as doubles; None: nothing. counts: Gaussians predicted and left out. pruning:
     as `prune` left it. layered: every photo has a whole layer of its own (`splat.compose`). refinement: what
     a fit to the photos brought. detail: what was spent on how fine elements, and what it bought. light:
-    `gains` and `offsets`, a row of red, green and blue for each view, by which `scene.light`
+    `gains` and `offsets`, a row of red, green and blue for each view, by which `scene.exposure_compensation`
     brought the photos' colours to one light. lens:
     `found`, a mapping of `FoundLens` for each lens that the photos told. left_out:
-    `shares`, of each view what was left out since the others do not show it (`scene.strangers`), `unplaced`,
+    `shares`, of each view what was left out since the others do not show it (`scene.transients`), `unplaced`,
     names of photos that could not be placed, and `films`, each with its name (`film`), how many `frames` were
     looked at, and what became of those that were not taken, `why` (phrases to counts). foreseen: `covered`,
     `alike` and `nearest`, a number for each view, as `splat.foreseen` has them. world: where

@@ -254,7 +254,8 @@ class Prediction:
     dictionary: (K, C) unit rows. viewmats (V, 4, 4). depths (V, H, W), z, same unit.
     confidences (V, H, W) in [0, 1]. unplaced: views whose pose is not known (view 0's stands in).
     timings: seconds per stage, in order. Ks: (V, 3, 3) as they were found, None: those of the views. lenses:
-    what of them the photos told.
+    what of them the photos told. bent: of each lens what was found, where one bends lines, so that photos are
+    to be straightened first; nothing else was sought then (`of_bent`).
     """
 
     gaussians: Gaussians
@@ -269,8 +270,16 @@ class Prediction:
     timings: dict[str, float] = field(default_factory=dict)
     Ks: Float[Tensor, "V 3 3"] | None = None
     lenses: tuple[FoundLens, ...] = ()
+    bent: tuple[FoundFocal | None, ...] = ()
 
     __repr__ = _brief
+
+    @staticmethod
+    def of_bent(lenses: tuple[FoundFocal | None, ...], space: str, timings: dict[str, float]) -> "Prediction":
+        """Of photos that are to be straightened: no photo, and no group."""
+        maps, groups = torch.zeros(0, 0, 0), (torch.zeros(0, 0, 0, 0), torch.zeros(0, 0))
+        nothing = *groups, space, torch.zeros(0, 4, 4), maps, maps
+        return Prediction(Gaussians.none(), *nothing, timings=timings, bent=lenses)
 
 
 @dataclass(frozen=True)

@@ -14,7 +14,7 @@ from langflash_core.images.views import source_pictures
 from langflash_core.scene.checks import check_scene
 from langflash_core.scene.detailed import assemble_detailed
 from langflash_core.scene.exposure import lit_camera
-from langflash_core.scene.light import Light
+from langflash_core.scene.exposure_compensation import ExposureCompensation
 from langflash_core.splat import render
 from langflash_core.splat.colours import ROUNDS
 from langflash_core.types import Camera, Scene
@@ -24,7 +24,7 @@ from tests.torch_threads import torch_threads
 NORMAL = DETAILS["normal"]
 
 
-def made(given: Photographed) -> tuple[Scene, Light]:
+def made(given: Photographed) -> tuple[Scene, ExposureCompensation]:
     covered = covered_scene(given.prediction, given.views, NORMAL, gaussians=None, preset="mini")
     return coloured_scene(covered), covered.light
 
@@ -35,7 +35,7 @@ def given() -> Photographed:
 
 
 @pytest.fixture(scope="module")
-def fine(given) -> tuple[Scene, Light]:
+def fine(given) -> tuple[Scene, ExposureCompensation]:
     return made(given)
 
 

@@ -16,7 +16,7 @@ from langflash_core.kept_prediction import arrays_of, prediction_of
 from langflash_core.network import GuidedDepthNet
 from langflash_core.network.stereo.keypoints import KeyPoints
 from langflash_core.reconstruction.finding import keep_of
-from langflash_core.records import FoundLens
+from langflash_core.records import FoundFocal, FoundLens
 from langflash_core.resources import asset_path
 from langflash_core.types import Gaussians, Prediction
 
@@ -93,12 +93,13 @@ def test_a_prediction_comes_back_to_the_same_bits():
         space="minilm", viewmats=torch.rand(2, 4, 4), depths=torch.rand(2, 4, 5),
         confidences=torch.rand(2, 4, 5), unplaced=(1,), warnings=("dark",), timings={"depth": 1.5},
         Ks=torch.rand(2, 3, 3), lenses=(FoundLens(61.0, 0.5, 4, 65.0, False),),
+        bent=(None, FoundFocal(1.1, 0.01, 5, -0.05, 0.002)),
     )  # fmt: skip
     back = prediction_of(arrays_of(given))
     for name in ("weights", "dictionary", "viewmats", "depths", "confidences", "Ks"):
         before, after = getattr(given, name), getattr(back, name)
         assert before.dtype == after.dtype and torch.equal(before, after)
-    for name in ("space", "unplaced", "warnings", "timings", "lenses"):
+    for name in ("space", "unplaced", "warnings", "timings", "lenses", "bent"):
         assert getattr(given, name) == getattr(back, name)
     assert (
         len(back.gaussians) == 0 and prediction_of(arrays_of(prediction_of(arrays_of(given)))).Ks is not None
@@ -162,3 +163,9 @@ def test_what_is_kept_hangs_on_photos_and_settings(tmp_path: Path):
     keys.add(keep_of(tmp_path, replace(views, images=views.images + 1 / 255), ("mini", 1)).key)
     keys.add(keep_of(tmp_path, replace(views, Ks=views.Ks * 1.01), ("mini", 1)).key)
     assert len(keys) == 4
+
+
+def test_photos_that_are_to_be_straightened_come_back():
+    given = Prediction.of_bent((None, FoundFocal(1.1, 0.01, 5, -0.05, 0.002)), "minilm", {"poses": 1.0})
+    back = prediction_of(arrays_of(given))
+    assert back.bent == given.bent and back.timings == given.timings and len(back.depths) == 0

@@ -18,7 +18,7 @@ from langflash_core.level import levelled
 from langflash_core.network import PRESETS, GuidedDepthNet, build_network, save_network
 from langflash_core.reconstruction import stages
 from langflash_core.reconstruction.views import found_views, straight_prediction
-from langflash_core.records import BentLens, FoundFocal
+from langflash_core.records import FoundFocal
 from langflash_core.resources import asset_path
 from langflash_core.splat import render
 from langflash_core.types import Camera, FoundLens, Gaussians, Lenses, Prediction, Scene, Semantics, Views
@@ -180,7 +180,9 @@ def test_photos_are_straightened_until_nothing_bends(rounds, unchecked):
         seen.append(views)
         assert views.lenses is not None
         if len(seen) <= rounds and not views.lenses.straight:
-            raise BentLens((FoundFocal(1.0, 0.01, 2, -0.05 / 4 ** len(seen), 0.001),))
+            return Prediction.of_bent(
+                (FoundFocal(1.0, 0.01, 2, -0.05 / 4 ** len(seen), 0.001),), "minilm", {}
+            )
         return replace(plain, viewmats=torch.eye(4).expand(len(seen), 4, 4))
 
     predicted, views = straight_prediction(predict, taken)
@@ -207,7 +209,7 @@ def test_a_lens_that_is_not_told_again_stays_straightened(unchecked):
 
     def predict(views: Views) -> Prediction:
         for found in rounds:
-            raise BentLens(found)
+            return Prediction.of_bent(found, "minilm", {})
         return Prediction(Gaussians.none(), nothing, nothing, "minilm", nothing, nothing, nothing)
 
     _, views = straight_prediction(predict, taken)

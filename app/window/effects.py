@@ -8,7 +8,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 from .commands import Command
-from .requests import Errand, Job
+from .requests import Job, Task
 from .state import State
 
 
@@ -22,7 +22,7 @@ class Hands:
 
     perform: Callable[[Command], None]
     dispatch: Callable[[Command], None]
-    submit: Callable[[Job | Errand], None]
+    submit: Callable[[Job | Task], None]
     cancel: Callable[[], None]
     now: Callable[[], float]
 

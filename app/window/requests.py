@@ -28,7 +28,7 @@ class Job(ABC):
         """
 
 
-class Errand(ABC):
+class Task(ABC):
     """Short work, done between jobs and between the stages of one.
 
     saves: a person asked for it to be written, and the end of the program waits for it.
@@ -54,7 +54,7 @@ class Errand(ABC):
 
 
 @dataclass(frozen=True)
-class SceneErrand(Errand):
-    """An errand about the scene with number `serial`; its commands hold for no other."""
+class SceneTask(Task):
+    """A task about the scene with number `serial`; its commands hold for no other."""
 
     serial: int

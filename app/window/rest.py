@@ -22,7 +22,7 @@ class RestEffects(Effects):
         return self._due
 
     def tick(self, state: State, now: float) -> None:
-        """Give back what pictures, jobs and errands left free."""
+        """Give back what pictures, jobs and tasks left free."""
         if now >= self._due:
             self._due = float("inf")
             give_back()

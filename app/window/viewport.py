@@ -154,12 +154,12 @@ class Viewport:
         if self._asked is not None:
             self.picture.ask(*self._asked)
 
-    def ask(self, keys: tuple[int, ...], query: "CompiledQuery | None", lapses: int = 0) -> None:
-        """Ask the prompts `keys`, in the order of `query`, compiled when `Asking.lapses` was `lapses`;
+    def ask(self, keys: tuple[int, ...], query: "CompiledQuery | None", revision: int = 0) -> None:
+        """Ask the prompts `keys`, in the order of `query`, compiled when `Asking.revision` was `revision`;
         None asks nothing."""
-        self._asked = keys, query, lapses
+        self._asked = keys, query, revision
         if self.picture is not None:
-            self.picture.ask(keys, query, lapses)
+            self.picture.ask(keys, query, revision)
 
     def mark(
         self,

@@ -1,7 +1,7 @@
 """The one worker thread: everything slow or heavy, and neither OpenGL nor ImGui.
 
 A *job* makes a scene; the newest replaces and cancels the one before, which then falls silent.
-*Errands* are short and run between jobs and, so that typing works during a reconstruction,
+*Tasks* are short and run between jobs and, so that typing works during a reconstruction,
 between the stages of one. What comes of either are commands.
 """
 
@@ -24,7 +24,7 @@ from langflash_core.errors import Cancelled, LangFlashError
 from langflash_core.memory import give_back, out_of_memory
 
 from .commands import Command, Notify, OfScene
-from .requests import Errand, Job, SceneErrand
+from .requests import Job, SceneTask, Task
 from .scene.commands import JobCancelled, JobFailed, Loaded, Progressed
 
 log = logging.getLogger(__name__)
@@ -45,8 +45,8 @@ class Worker:
     def __init__(self, notify: Callable[[], None] = lambda: None, begins: bool = True) -> None:
         self._notify = notify
         self._changed = threading.Condition()
-        self._errands: list[Errand] = []
-        self._errand: Errand | None = None  # under way
+        self._tasks: list[Task] = []
+        self._task: Task | None = None  # under way
         self._job: Job | None = None
         self._token = 0  # of the newest job; an older one is silent
         self._busy = False  # with a job that speaks
@@ -62,17 +62,17 @@ class Worker:
         if self._thread.ident is None:
             self._thread.start()
 
-    def submit(self, request: Job | Errand) -> None:
+    def submit(self, request: Job | Task) -> None:
         """Queue a request; a job cancels the job under way."""
         with self._changed:
             if isinstance(request, Job):
                 self._job = request
                 self._token += 1
             else:
-                kept = self._errands
+                kept = self._tasks
                 if request.newest_counts:
                     kept = [e for e in kept if type(e) is not type(request)]
-                self._errands = [*kept, request]
+                self._tasks = [*kept, request]
             self._changed.notify()
 
     def cancel(self) -> None:
@@ -98,8 +98,8 @@ class Worker:
         dies with the process."""
         with self._changed:
             self._stopping = True
-            self._errands = [errand for errand in self._errands if errand.saves]
-            if self._errands or (self._errand is not None and self._errand.saves):
+            self._tasks = [task for task in self._tasks if task.saves]
+            if self._tasks or (self._task is not None and self._task.saves):
                 patience = SAVING_SECONDS
                 self.begin()
             self._changed.notify()
@@ -114,7 +114,7 @@ class Worker:
     def _run(self) -> None:
         try:
             for load in (_link_torch, _import_heavy):
-                self._run_errands(light=True)
+                self._run_tasks(light=True)
                 load()
             self._put(Loaded())
         except Exception as error:  # a broken installation: say so, and let each request say it again
@@ -123,38 +123,38 @@ class Worker:
         while True:
             with self._changed:
                 self._changed.wait_for(self._asked, IDLE if foresight else None)
-                if self._stopping and not self._errands:
+                if self._stopping and not self._tasks:
                     return
                 job, token = self._job, self._token
-                if not self._errands:
+                if not self._tasks:
                     self._job, self._busy = None, job is not None
-            if self._errands:
-                self._run_errands()
+            if self._tasks:
+                self._run_tasks()
             elif job is not None:
                 self._run_job(job, token)
             elif foresight:
                 _import_ahead(foresight.pop(0))
 
     def _asked(self) -> bool:
-        return bool(self._stopping or self._errands or self._job)
+        return bool(self._stopping or self._tasks or self._job)
 
-    def _run_errands(self, light: bool = False) -> None:
+    def _run_tasks(self, light: bool = False) -> None:
         """Run what is queued now, oldest first. light: only what needs nothing loaded."""
         while True:
             with self._changed:
-                errand = next((each for each in self._errands if each.light or not light), None)
-                self._errand = errand
-                if errand is None:
+                task = next((each for each in self._tasks if each.light or not light), None)
+                self._task = task
+                if task is None:
                     return
-                self._errands.remove(errand)
+                self._tasks.remove(task)
             try:
-                for command in errand.run(lambda: self._stopping):
-                    about = isinstance(errand, SceneErrand)
-                    self._put(OfScene(errand.serial, command) if about else command)
+                for command in task.run(lambda: self._stopping):
+                    about = isinstance(task, SceneTask)
+                    self._put(OfScene(task.serial, command) if about else command)
             except LangFlashError as error:
-                self._put(*errand.failed(str(error)))
+                self._put(*task.failed(str(error)))
             except Exception as error:
-                self._put(*errand.failed(_unexpected(error)))
+                self._put(*task.failed(_unexpected(error)))
 
     def _run_job(self, job: Job, token: int) -> None:
         def stale() -> bool:
@@ -167,7 +167,7 @@ class Worker:
             if not stale():
                 self._put(Progressed(stage, fraction))
             with _outside_inference():
-                self._run_errands()
+                self._run_tasks()
 
         self._serial += 1
         try:
@@ -188,7 +188,7 @@ class Worker:
 
 def _outside_inference() -> AbstractContextManager[None]:
     """A network tells of its progress in the mode in which it predicts; tensors that are made there can never
-    be changed outside of it, and those of errands are kept and changed."""
+    be changed outside of it, and those of tasks are kept and changed."""
     torch = sys.modules.get("torch")
     return nullcontext() if torch is None else torch.inference_mode(False)
 

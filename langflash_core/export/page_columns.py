@@ -15,7 +15,7 @@ from jaxtyping import Bool, Integer
 from torch import Tensor
 
 from langflash_core.export.quantised import quantised
-from langflash_core.geometry.cameras import pictured
+from langflash_core.rig.projected import project_points
 from langflash_core.types import Scene
 
 MOST_WEIGHTS = 4  # of a Gaussian; `langflash bench` says what the others are worth
@@ -142,10 +142,12 @@ def _places(
     """Pixel x, y and the logarithm of depth in a photo of some Gaussians, in `PLACE_STEPS`: the lowest of
     each, and what is above it, in 16 bits; None where one has no place there."""
     points = scene.gaussians.means[rows.to(scene.gaussians.means.device)].double().cpu()
-    x, y, z = pictured(scene.viewmats[view].double().cpu(), scene.Ks[view].double().cpu(), points.T)
-    if not bool((z > _NEAREST).all()):
+    camera = scene.viewmats[view].double().cpu(), scene.Ks[view].double().cpu()
+    width, height = scene.view_size
+    there = project_points(points.T, *camera, (height, width))
+    if not bool((there.z > _NEAREST).all()):
         return None
-    steps = np.round(torch.stack((x, y, z.log()), 1).numpy() * PLACE_STEPS)
+    steps = np.round(torch.stack((there.x, there.y, there.z.log()), 1).numpy() * PLACE_STEPS)
     lowest = steps.min(0)
     above = steps - lowest
     return (lowest.astype(int), above.astype(int)) if above.max() < 1 << 16 else None

@@ -71,18 +71,6 @@ def transform(
     return points @ matrices[..., :3, :3].transpose(-1, -2) + matrices[..., None, :3, 3]
 
 
-def pictured(
-    viewmat: Float[Tensor, "4 4"], K: Float[Tensor, "3 3"], points: Float[Tensor, "3 n"], eps: float = 1e-8
-) -> tuple[Float[Tensor, " n"], Float[Tensor, " n"], Float[Tensor, " n"]]:
-    """Pixel x, y and depth z (n,) in one view, of points (3, n), a row an axis.
-
-    `transform` and `project` of many points in the layout that a processor goes through fastest.
-    """
-    x, y, z = viewmat[:3, :3] @ points + viewmat[:3, 3:]
-    ahead = z.clamp_min(eps)
-    return x / ahead * K[0, 0] + K[0, 2], y / ahead * K[1, 1] + K[1, 2], z
-
-
 def invert_rigid(matrices: Float[Tensor, "*n 4 4"]) -> Float[Tensor, "*n 4 4"]:
     """Inverse of rigid (..., 4, 4) without a linear solve: [R^T, -R^T t]."""
     rotations = matrices[..., :3, :3].transpose(-1, -2)

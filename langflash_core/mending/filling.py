@@ -27,9 +27,10 @@ from langflash_core.geometry.cameras import invert_rigid, rays, transform, unpro
 from langflash_core.geometry.harmonics import colour_to_sh
 from langflash_core.geometry.quaternions import matrices_to_quats
 from langflash_core.geometry.surfels import ellipses, spans
+from langflash_core.rig.projected import project_points
 from langflash_core.scene.assemble import sparse_weights
+from langflash_core.scene.exposure_compensation import GAIN_RANGE, LARGEST_OFFSET
 from langflash_core.scene.joining import appended
-from langflash_core.scene.light import GAIN_RANGE, LARGEST_OFFSET
 from langflash_core.types import Camera, Gaussians, Scene
 
 from .looks import Render, mattes
@@ -86,14 +87,11 @@ class _View:
         Bool[np.ndarray, " n"], Integer[np.ndarray, " n"], Integer[np.ndarray, " n"], Float[np.ndarray, " n"]
     ]:
         """Whether points are in the picture, their rows, columns and depths."""
-        viewmat, K = self.camera.viewmat.double().numpy(), self.camera.K.double().numpy()
-        x, y, z = (points @ viewmat[:3, :3].T + viewmat[:3, 3]).T
-        ahead = np.where(z > 1e-9, z, np.inf)
-        columns = np.floor(x / ahead * K[0, 0] + K[0, 2])
-        rows = np.floor(y / ahead * K[1, 1] + K[1, 2])
         height, width = self.hole.shape
-        inside = (z > 1e-9) & (columns >= 0) & (columns < width) & (rows >= 0) & (rows < height)
-        return inside, np.where(inside, rows, 0).astype(int), np.where(inside, columns, 0).astype(int), z
+        camera = self.camera.viewmat.double(), self.camera.K.double()
+        there = project_points(torch.from_numpy(points).double().T, *camera, (height, width))
+        pixels = there.pixels.numpy()
+        return there.inside.numpy(), pixels // width, pixels % width, there.z.numpy()
 
 
 def fill(scene: Scene, removed: Tensor, render: Render) -> Scene:

@@ -21,7 +21,7 @@ import torch
 from torch import Tensor
 
 from langflash_core.errors import InputError
-from langflash_core.geometry.cameras import pictured
+from langflash_core.rig.projected import project_points
 from langflash_core.scene.instances import instances
 from langflash_core.scene.joining import appended
 from langflash_core.scene.prune import sparser
@@ -120,7 +120,7 @@ def hide(
     done = appended(kept, made).with_record(others={})
     told("photos", 0.6)
     if hiding.photos:
-        masks = [mask | _strangers(scene, view, hiding, render) for view, mask in enumerate(masks)]
+        masks = [mask | _transients(scene, view, hiding, render) for view, mask in enumerate(masks)]
     done, shares = _with_photos(done, masks, hiding, render)
     report = Hidden(
         hiding.how, int(members.sum()), int(rows.sum() - members.sum()), len(made.gaussians), side, shares,
@@ -162,13 +162,9 @@ def _reached(scene: Scene, members: Tensor, render: Render) -> tuple[list[np.nda
 def _lying_in(means: Tensor, camera: Camera, depths: Tensor) -> tuple[Tensor, Tensor, Tensor]:
     """(N,) each: whether places are in a view's picture, at which of its pixels (0 outside), and whether they
     are no farther than what it shows there, depths (H, W)."""
-    columns, lines, z = pictured(camera.viewmat.cpu(), camera.K.cpu(), means.T)
-    height, width = depths.shape
-    x, y = columns.floor(), lines.floor()
-    inside = (z > 0) & (x >= 0) & (x < width) & (y >= 0) & (y < height)
-    pixels = torch.where(inside, y * width + x, 0).long()
-    shown = depths.flatten()[pixels]
-    return inside, pixels, (shown * _BESIDE >= z) | (shown <= 0)
+    there = project_points(means.T, camera.viewmat.cpu(), camera.K.cpu(), (depths.shape[0], depths.shape[1]))
+    shown = there.looked_up(depths.flatten())
+    return there.inside, there.pixels, (shown * _BESIDE >= there.z) | (shown <= 0)
 
 
 def _block_side(scene: Scene, members: Tensor, blocks: float) -> float:
@@ -222,7 +218,7 @@ def _pinned(notes: list[dict], scene: Scene, rows: Tensor) -> list[bool]:
     return found
 
 
-def _strangers(scene: Scene, view: int, hiding: Hiding, render: Render) -> np.ndarray:
+def _transients(scene: Scene, view: int, hiding: Hiding, render: Render) -> np.ndarray:
     """(H, W) bool: what a photo shows that was left out of the scene, where anything of that photo was."""
     shares = scene.record.left_out.get("shares", ())
     if not scene.photos or view >= len(shares) or not shares[view]:

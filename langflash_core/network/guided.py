@@ -1,22 +1,16 @@
 """The network with guided depth: depth maps, matches, poses and a plane sweep give the geometry."""
 
-import math
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator, Sequence
 from contextlib import contextmanager, nullcontext
-from dataclasses import replace
 from functools import partial
 from types import MappingProxyType
 from typing import cast
 
-import cv2
-import numpy as np
 import torch
 from jaxtyping import Float
 from torch import Tensor
 from torch.nn import functional as F
 
-from langflash_core.geometry.cameras import rays
-from langflash_core.keeping import MATCHES
 from langflash_core.memory import give_back
 from langflash_core.network.encoders.late import LateHalf, with_taught
 from langflash_core.network.encoders.local import LocalFeatures
@@ -24,7 +18,7 @@ from langflash_core.network.encoders.others import OtherEyes
 from langflash_core.network.encoders.shared import Encoder, Tokens, tokens_to_maps
 from langflash_core.network.gaussians import GaussianHead, assemble_gaussians
 from langflash_core.network.layers.decoder import SiameseDecoder, TwoStackDecoder
-from langflash_core.network.many import FEW, groups_of, held, in_groups, together
+from langflash_core.network.many import FEW, groups_of, held, together
 from langflash_core.network.model import MEANING_STAGES, Geometry, LangFlashNet, Seen
 from langflash_core.network.presets import GuidedDepth
 from langflash_core.network.semantics.aggregation import Aggregation
@@ -39,28 +33,25 @@ from langflash_core.network.semantics.grouping import (
 from langflash_core.network.semantics.naming import PartNamer, describe, places
 from langflash_core.network.semantics.second import SecondHead, both, looked_at
 from langflash_core.network.semantics.splitting import condensed, joint_maps, split_groups, split_maps
-from langflash_core.network.stereo.adjustment import Sought
-from langflash_core.network.stereo.agreement import agreed
-from langflash_core.network.stereo.alignment import Correction
-from langflash_core.network.stereo.inputs import grown
-from langflash_core.network.stereo.keypoints import KeyPoints, decoded, match_photos, match_sources
-from langflash_core.network.stereo.partners import partners
-from langflash_core.network.stereo.planes import flattened
-from langflash_core.network.stereo.planesweep import searched
-from langflash_core.network.stereo.poses import PoseInput, Poses, estimate_poses, on_other_maps
+from langflash_core.network.stereo.cameras import (
+    find_poses,
+    found_lenses,
+    is_other_lens,
+    placed_rig,
+    rescale_poses,
+)
+from langflash_core.network.stereo.poses import Poses
 from langflash_core.network.stereo.prior import DepthHead, DepthMaps
-from langflash_core.network.stereo.registration import registered
 from langflash_core.network.stereo.retrieval import most_alike
-from langflash_core.network.stereo.sharpening import sharpened
+from langflash_core.network.stereo.surfaces import one_by_one, one_surface
 from langflash_core.network.stereo.sweep import DepthRefiner
+from langflash_core.rig.neighbours import source_views
+from langflash_core.rig.rig import Rig
 from langflash_core.running import Run
 from langflash_core.types import Gaussians, Views
 
-_SWEPT = 0.3  # of the time of refinement, before photos are registered one by one
 _READ = 15  # photos that each of many reads in the decoder
 _CLOSELY = 32  # photos, up to which language features are held at their full size
-_OTHER_LENS = 0.01
-"""Change of the focal length, as a logarithm, from which depth is predicted anew: it is known no better."""
 
 
 class GuidedDepthNet(LangFlashNet):
@@ -270,160 +261,62 @@ class GuidedDepthNet(LangFlashNet):
     ) -> Geometry:
         """Depth, poses, refined depth with edges and flat surfaces that agrees between photos, Gaussians."""
         with run.stage("depth"):
-            levels = self.levels(tokens, Ks)
-            prior = self._prior(levels, tokens)
+            levels, prior = self._predicted(tokens, Ks)
         with run.stage("poses"):
-            local = _one_by_one(self.local, images[0])
-            inputs = self._pose_inputs(Ks[0], views.size, prior, local)
-            poses = estimate_poses(inputs, _key_points(views, run), run.check, _known(views), _sought(views))
-            Ks = _with_lens(Ks, poses)
-            if np.abs(np.log(poses.growths)).max() > _OTHER_LENS:
-                levels = self.levels(tokens, Ks)
-                prior = self._prior(levels, tokens)
-                poses = on_other_maps(poses, self._pose_inputs(Ks[0], views.size, prior, local))
-            viewmats = torch.from_numpy(poses.viewmats).to(images)[None]
+            local = one_by_one(self.local, images[0])
+            poses = find_poses(views, Ks[0], prior, local, run)
+            if poses.bent:
+                return Geometry.of_bent(poses.bent)
+            Ks = found_lenses(Ks[0], poses)[None]
+            if is_other_lens(poses):
+                levels, prior = self._predicted(tokens, Ks)
+                poses = rescale_poses(poses, views, Ks[0], prior, local)
+            rig = placed_rig(images[0], Ks[0], prior, poses)
         with run.stage("refinement"):
-            maps = self._refine(images, tokens, local, prior, poses, viewmats, Ks)
-            sharp = _one_by_one(sharpened, maps.log_depths, images[0])
-            maps = replace(maps, log_depths=in_groups(flattened, sharp, maps.log_errors))
-            maps = _agreed(maps, images[0], views, poses, viewmats[0], Ks[0], run)
-        if not elements:
-            return _geometry(Gaussians.none(), maps, poses, viewmats[0], Ks[0], views)
-        with run.stage("Gaussians"):
-            raw = self.gaussian_head(levels, images)
-            gaussians = assemble_gaussians(raw[0], images[0], maps, viewmats[0], Ks[0])
-        return _geometry(gaussians, maps, poses, viewmats[0], Ks[0], views)
+            rig = one_surface(self._refine(rig, tokens, local, poses.guessed), poses.guessed, views, run)
+        gaussians = Gaussians.none()
+        if elements:
+            with run.stage("Gaussians"):
+                raw, maps = self.gaussian_head(levels, images), DepthMaps(rig.log_depths, rig.log_errors)
+                gaussians = assemble_gaussians(raw[0], images[0], maps, rig.viewmats, rig.Ks)
+        return _geometry(gaussians, rig, poses, views)
 
-    def _refine(self, images, tokens, local, prior: DepthMaps, poses: Poses, viewmats, Ks) -> DepthMaps:
-        """Refined maps (V, H, W), in view 0's unit; a view of unknown pose keeps its prior."""
-        logs = [
-            _corrected(prior.log_depths[0, v], K, correction) + math.log(scale)
-            for v, (K, scale, correction) in enumerate(
-                zip(Ks[0], poses.depth_scales, poses.corrections, strict=True)
-            )
-        ]
-        scaled = DepthMaps(torch.stack(logs)[None], prior.log_errors)
-        keep = [v for v in range(images.shape[1]) if v not in poses.guessed]
-        maps = DepthMaps(scaled.log_depths[0], scaled.log_errors[0])
+    def _predicted(self, tokens: Tokens, Ks: Tensor) -> tuple[tuple[Tensor, ...], DepthMaps]:
+        """What the geometry heads read, and depth of each photo by itself."""
+        levels = self.levels(tokens, Ks)
+        return levels, self._prior(levels, tokens)
+
+    def _refine(self, rig: Rig, tokens: Tokens, local: Tensor, guessed: Sequence[int]) -> Rig:
+        """Depths refined by the sweep; a view of unknown pose keeps its prior."""
+        keep = [v for v in range(len(rig)) if v not in guessed]
         if len(keep) < 2:
-            return maps
-        near = partners(maps.log_depths[keep], viewmats[0, keep], Ks[0, keep])
-        log_depths, log_errors = maps.log_depths.clone(), maps.log_errors.clone()
+            return rig
+        assert rig.photos is not None, "photos are what is compared"
+        near = source_views(rig.some(keep))
+        log_depths, log_errors = rig.log_depths.clone(), rig.log_errors.clone()
         for some in groups_of(len(keep)):
             own, others = keep[some], [[keep[other] for other in of] for of in near[some]]
             ids = own if len(own) == len(keep) else [*own, *sorted({o for of in others for o in of} - {*own})]
             refined = self.refiner(
-                images[:, ids],
+                rig.photos[None, ids],
                 tokens.views(ids),
                 local[ids],
-                DepthMaps(scaled.log_depths[:, own], scaled.log_errors[:, own]),
-                viewmats[:, ids],
-                Ks[:, ids],
+                DepthMaps(rig.log_depths[None, own], rig.log_errors[None, own]),
+                rig.viewmats[None, ids],
+                rig.Ks[None, ids],
                 [[ids.index(other) for other in of] for of in others],
                 len(own),
             )[-1]
             log_depths[own], log_errors[own] = refined.log_depths[0], refined.log_errors[0]
             if len(ids) > len(own):
                 give_back()  # groups look at more and fewer others: what one leaves fits no other
-        return DepthMaps(log_depths, log_errors)
-
-    @staticmethod
-    def _pose_inputs(Ks: Tensor, size: tuple[int, int], prior: DepthMaps, local: Tensor) -> list[PoseInput]:
-        depths = prior.depths[0].cpu().numpy()  # once: a view of every call's own would hold all of it
-        return [
-            PoseInput(
-                K=K.double().cpu().numpy(),
-                size=size,
-                depth=depths[v],
-                local=local[v].cpu().numpy(),
-            )
-            for v, K in enumerate(Ks)
-        ]
+        return Rig.of_logs(log_depths, rig.viewmats, rig.Ks, log_errors, rig.photos)
 
 
-def _one_by_one(work: Callable[..., Tensor], *of_views: Tensor) -> Tensor:
-    """What `work` makes of all views (V, ...), view by view: a processor's caches hold one, not eight."""
-    return torch.cat([work(*own) for own in zip(*(values.split(1) for values in of_views), strict=True)])
-
-
-def _agreed(
-    maps: DepthMaps, images: Tensor, views: Views, poses: Poses, viewmats: Tensor, Ks: Tensor, run: Run
-) -> DepthMaps:
-    """Maps (V, H, W); those of known pose show one surface, to a fraction of the photos' pixels, and what the
-    maps had missed."""
-    placed = [v for v in range(len(viewmats)) if v not in poses.guessed]
-    if len(placed) < 2:
-        return maps
-    part = DepthMaps(maps.log_depths[placed], maps.log_errors[placed])
-    cameras = viewmats[placed], Ks[placed]
-    near = partners(part.log_depths, *cameras)
-    part = agreed(part, *cameras, near)
-    photos = _greys(views)
-    greys = [photos[v] for v in placed]
-    logs = searched(part.log_depths, greys, *cameras, near, run.check)
-    part = replace(part, log_depths=_one_by_one(sharpened, logs, images[placed]))
-    told = run.counted("refinement", "photo", range(len(placed)), _SWEPT)
-
-    def each(view: int, make: Callable[[], Tensor]) -> Tensor:
-        next(told)
-        found = run.kept(f"depth-{view}", lambda: {"log_depths": make().cpu().numpy()})
-        return torch.from_numpy(np.array(found["log_depths"])).to(logs)
-
-    log_depths = maps.log_depths.clone()
-    part = registered(part, greys, *cameras, near, run.check, each)
-    log_depths[placed] = in_groups(flattened, part.log_depths, part.log_errors)
-    return replace(maps, log_depths=log_depths)
-
-
-def _geometry(
-    gaussians: Gaussians, maps: DepthMaps, poses: Poses, viewmats: Tensor, Ks: Tensor, views: Views
-) -> Geometry:
+def _geometry(gaussians: Gaussians, rig: Rig, poses: Poses, views: Views) -> Geometry:
     """What is handed over, with the lenses that were found."""
+    assert rig.confidences is not None, "depth comes with its errors"
     found = () if views.lenses is None else views.lenses.found(poses.lenses)
-    depths, confidences = maps.depths, maps.confidences
     notes = (poses.doubt,) if poses.doubt else ()
-    return Geometry(gaussians, viewmats, depths, confidences, poses.guessed, Ks.cpu(), found, notes)
-
-
-def _sought(views: Views) -> Sought | None:
-    """Lenses that are not given."""
-    return (
-        None
-        if views.lenses is None
-        else Sought(views.lenses.of, views.lenses.doubts, not views.lenses.straight)
-    )
-
-
-def _with_lens(Ks: Tensor, poses: Poses) -> Tensor:
-    """Intrinsics (1, V, 3, 3) of the lenses that were found."""
-    if poses.adjusted is None or (poses.growths == 1).all():
-        return Ks
-    return torch.from_numpy(grown(Ks[0].double().cpu().numpy(), poses.growths)).to(Ks)[None]
-
-
-def _known(views: Views) -> np.ndarray | None:
-    """Poses that were given, float64, world = view 0."""
-    return None if views.viewmats is None else views.viewmats.double().cpu().numpy()
-
-
-def _corrected(log_depths: Tensor, K: Tensor, correction: Correction) -> Tensor:
-    """Log depths (H, W) straightened by the matches."""
-    height, width = log_depths.shape
-    x = rays(K, width, height)[..., :2].cpu().numpy()
-    change = correction.at(x, log_depths.cpu().numpy())
-    return log_depths + torch.from_numpy(change).to(log_depths)
-
-
-def _key_points(views: Views, run: Run) -> KeyPoints:
-    """Of the largest version of the photos at hand."""
-    if not views.sources:
-        return match_photos(_greys(views), run.check)
-    return KeyPoints.of(run.kept(MATCHES, lambda: match_sources(views.sources, run.check).arrays()))
-
-
-def _greys(views: Views) -> list[np.ndarray]:
-    """The largest version of the photos at hand, (h, w) uint8 each."""
-    if views.sources:
-        return [decoded(source) for source in views.sources]
-    photos = (views.images.movedim(1, -1).cpu().numpy() * 255).round().astype(np.uint8)  # (V, H, W, 3)
-    return [cv2.cvtColor(rgb, cv2.COLOR_RGB2GRAY) for rgb in photos]
+    maps = rig.viewmats, rig.depths, rig.confidences
+    return Geometry(gaussians, *maps, poses.guessed, rig.Ks.cpu(), found, notes)

@@ -19,6 +19,7 @@ from langflash_core.network.many import in_groups
 from langflash_core.network.presets import Preset
 from langflash_core.network.semantics.aggregation import Aggregation, averaged_atoms
 from langflash_core.network.semantics.grouping import Groups
+from langflash_core.records import FoundFocal
 from langflash_core.running import Kept, Progress, Run, evenly
 from langflash_core.types import FoundLens, Gaussians, Prediction, Views
 
@@ -40,6 +41,13 @@ class Geometry:
     Ks: Float[Tensor, "V 3 3"] | None = None
     lenses: tuple[FoundLens, ...] = ()
     warnings: tuple[str, ...] = ()
+    bent: tuple[FoundFocal | None, ...] = ()
+
+    @staticmethod
+    def of_bent(lenses: tuple[FoundFocal | None, ...]) -> "Geometry":
+        """Of photos that are to be straightened first."""
+        none = torch.zeros(0, 0, 0)
+        return Geometry(Gaussians.none(), torch.zeros(0, 4, 4), none, none, (), bent=lenses)
 
 
 @dataclass(frozen=True)
@@ -273,6 +281,9 @@ class LangFlashNet(nn.Module):
         geometries = [
             self.reconstruct(s, x, K, own, run, elements) for s, (x, K, own) in zip(scenes, each, strict=True)
         ]
+        bent = next((found.bent for found in geometries if found.bent), ())
+        if bent:
+            return [Prediction.of_bent(bent, self.preset.space, dict(run.timings)) for _ in scenes]
         scenes = [_through(views, found.Ks) for views, found in zip(scenes, geometries, strict=True)]
         with run.stage("language features"):
             features = language()

@@ -15,19 +15,19 @@ from langflash_core.kept_prediction import arrays_of, prediction_of
 from langflash_core.network import PRESETS
 from langflash_core.network.checkpoints.parts import part_folder
 from langflash_core.network.checkpoints.stored import weights_file
+from langflash_core.reconstruction.options import Options
 from langflash_core.reconstruction.tools import Tools
-from langflash_core.reconstruction.wishes import Wishes
 from langflash_core.running import Kept, Run
 from langflash_core.types import Prediction, Views
 
 
-def predictor(wishes: Wishes, tools: Tools, ahead: Ahead, run: Run) -> Callable[[Views], Prediction]:
-    """Views to what the network finds in them, on the CPU; what `wishes.keep` holds is not done again."""
+def predictor(options: Options, tools: Tools, ahead: Ahead, run: Run) -> Callable[[Views], Prediction]:
+    """Views to what the network finds in them, on the CPU; what `options.keep` holds is not done again."""
 
     def predicted(views: Views) -> Prediction:
-        if wishes.keep is None:
+        if options.keep is None:
             return _made(views, not_kept, tools, ahead, run)
-        kept = keep_of(wishes.keep, views, _settings(wishes, tools), ahead.gone_on)
+        kept = keep_of(options.keep, views, _settings(options, tools), ahead.gone_on)
         return prediction_of(kept("prediction", lambda: arrays_of(_made(views, kept, tools, ahead, run))))
 
     return predicted
@@ -57,15 +57,15 @@ def _made(views: Views, kept: Kept, tools: Tools, ahead: Ahead, run: Run) -> Pre
     return replace(prediction, gaussians=prediction.gaussians.map(Tensor.cpu), **tensors)
 
 
-def _settings(wishes: Wishes, tools: Tools) -> tuple:
+def _settings(options: Options, tools: Tools) -> tuple:
     return (
-        wishes.preset,
-        wishes.device,
-        wishes.precision,
-        wishes.aggregation,
-        wishes.grouping,
+        options.preset,
+        options.device,
+        options.precision,
+        options.aggregation,
+        options.grouping,
         tools.finer is None,
-        _identity(wishes.preset, wishes.weights),
+        _identity(options.preset, options.weights),
     )
 
 

@@ -19,10 +19,10 @@ from langflash_core.level import levelled
 from langflash_core.memory import peak_memory_mb
 from langflash_core.reconstruction.finding import predictor
 from langflash_core.reconstruction.networks import Networks
+from langflash_core.reconstruction.options import Options
 from langflash_core.reconstruction.refining import refined
 from langflash_core.reconstruction.tools import Tools, open_tools
 from langflash_core.reconstruction.views import found_views, posed_views, straight_prediction
-from langflash_core.reconstruction.wishes import Wishes
 from langflash_core.running import Run
 from langflash_core.scene.assemble import assemble
 from langflash_core.scene.prune import prune
@@ -35,65 +35,65 @@ _PATIENCE = 0.2  # seconds, until it is told again how far something is
 _AS_IT_IS = "the preset '{}' makes one Gaussian a pixel; the detail that was asked for is left out"
 
 
-def scene_of(wishes: Wishes, run: Run, networks: Networks, ahead: Ahead | None) -> Scene:
-    """The scene that was wished for; errors and `ahead` as of `pipeline.reconstruct`. However it ends,
+def scene_of(options: Options, run: Run, networks: Networks, ahead: Ahead | None) -> Scene:
+    """The scene that was asked for; errors and `ahead` as of `pipeline.reconstruct`. However it ends,
     nothing of it runs on."""
     try:
-        wishes = wishes.settled()
-        ahead = ahead or _begun(wishes, run)
-        return _made(wishes, run, networks, ahead)
+        options = options.settled()
+        ahead = ahead or _begun(options, run)
+        return _made(options, run, networks, ahead)
     finally:
         if ahead is not None:
             ahead.end()
 
 
-def _begun(wishes: Wishes, run: Run) -> Ahead:
+def _begun(options: Options, run: Run) -> Ahead:
     """What can be done beside the rest."""
     return begin(
-        wishes.photos,
-        preset=wishes.preset,
-        weights=wishes.weights,
-        size=wishes.size,
+        options.photos,
+        preset=options.preset,
+        weights=options.weights,
+        size=options.size,
         read_weights=False,
         check=run.check,
-        keep=wishes.keep,
+        keep=options.keep,
     )
 
 
-def _made(wishes: Wishes, run: Run, networks: Networks, ahead: Ahead) -> Scene:
-    views = _photos(wishes, run, ahead)
-    tools = _weights(wishes, run, networks, ahead, views)
-    scene, images, lenses = _assembled(wishes, run, ahead, tools, views)
-    if wishes.refine_seconds is not None:
-        scene = _refined(wishes, run, scene, images)
+def _made(options: Options, run: Run, networks: Networks, ahead: Ahead) -> Scene:
+    views = _photos(options, run, ahead)
+    tools = _weights(options, run, networks, ahead, views)
+    scene, images, lenses = _assembled(options, run, ahead, tools, views)
+    if options.refine_seconds is not None:
+        scene = _refined(options, run, scene, images)
     if lenses:
         scene = scene.with_record(lens={"found": [asdict(lens) for lens in lenses]})
     run.check()
-    scene = _in_world(wishes, scene)
+    scene = _in_world(options, scene)
     with run.stage("level"):
         scene = levelled(scene.with_record(calibration=dict(tools.network.calibration)))
     run.report("done", 1.0)
     return _with_cost(scene, run.timings)
 
 
-def _photos(wishes: Wishes, run: Run, ahead: Ahead) -> Views:
+def _photos(options: Options, run: Run, ahead: Ahead) -> Views:
     """The photos as views."""
     with run.stage("photos"):
         views = load_views(
-            wishes.photos,
-            fov=wishes.fov,
-            intrinsics=wishes.intrinsics,
+            options.photos,
+            fov=options.fov,
+            intrinsics=options.intrinsics,
             check=run.check,
             pictures=ahead.pictures.result,
         )
         check_shown(views.names, list(views.images))
-    return posed_views(views, wishes.viewmats, wishes.preset)
+    return posed_views(views, options.viewmats, options.preset)
 
 
-def _weights(wishes: Wishes, run: Run, networks: Networks, ahead: Ahead, views: Views) -> Tools:
+def _weights(options: Options, run: Run, networks: Networks, ahead: Ahead, views: Views) -> Tools:
     """The network and its helpers; key points are found beside."""
     with run.stage("weights"):
-        tools = open_tools(wishes, views, networks, ahead.stored)
+        tools = open_tools(options, views, networks, ahead.stored)
         _wait_for_matches(ahead, run)
     return tools
 
@@ -111,56 +111,56 @@ def _wait_for_matches(ahead: Ahead, run: Run) -> None:
             told(f"weights: {ahead.matching}", ahead.matching.share)
 
 
-def _found(wishes: Wishes, run: Run, ahead: Ahead, tools: Tools, views: Views) -> tuple[Prediction, Views]:
+def _found(options: Options, run: Run, ahead: Ahead, tools: Tools, views: Views) -> tuple[Prediction, Views]:
     """What the network finds, and the views as it has them now."""
     with run.stage("network"):
-        prediction, views = straight_prediction(predictor(wishes, tools, ahead, run), views)
+        prediction, views = straight_prediction(predictor(options, tools, ahead, run), views)
         return prediction, found_views(views, prediction)
 
 
 def _assembled(
-    wishes: Wishes, run: Run, ahead: Ahead, tools: Tools, views: Views
+    options: Options, run: Run, ahead: Ahead, tools: Tools, views: Views
 ) -> tuple[Scene, Float[Tensor, "V 3 H W"], tuple[FoundLens, ...]]:
     """The scene; the photos with a place in it, in the light that its colours are of; the lenses found."""
-    prediction, views = _found(wishes, run, ahead, tools, views)
+    prediction, views = _found(options, run, ahead, tools, views)
     images = views.images[[v for v in range(views.num_views) if v not in prediction.unplaced]]
     lenses = prediction.lenses
     with run.stage("assemble"), torch.no_grad():
         if tools.finer is None:
-            if wishes.gaussians is not None or wishes.detail not in (None, DEFAULT_DETAIL):
-                note = _AS_IT_IS.format(wishes.preset)
+            if options.gaussians is not None or options.detail not in (None, DEFAULT_DETAIL):
+                note = _AS_IT_IS.format(options.preset)
                 prediction = replace(prediction, warnings=(*prediction.warnings, note))
-            return prune(assemble(prediction, views, preset=wishes.preset)), images, lenses
+            return prune(assemble(prediction, views, preset=options.preset)), images, lenses
         told = run.within("assemble")
         covered = covered_scene(
             prediction,
             views,
             tools.finer,
-            gaussians=wishes.gaussians,
-            preset=wishes.preset,
+            gaussians=options.gaussians,
+            preset=options.preset,
             progress=told,
         )
         del prediction  # five megabytes a photo that nobody asks for any more
         return coloured_scene(covered, told), covered.light.corrected(images), lenses
 
 
-def _refined(wishes: Wishes, run: Run, scene: Scene, images: Float[Tensor, "V 3 H W"]) -> Scene:
+def _refined(options: Options, run: Run, scene: Scene, images: Float[Tensor, "V 3 H W"]) -> Scene:
     """The scene fitted to its photos, with the seconds of that in its record."""
-    assert wishes.refine_seconds is not None
+    assert options.refine_seconds is not None
     with run.stage("refine"):
         told = run.within("refine")
-        scene = refined(scene, images, wishes.refine_seconds, wishes.device, told)
+        scene = refined(scene, images, options.refine_seconds, options.device, told)
     fitting = {**scene.record.cost.timings, "fitting": run.timings["refine"]}
     return scene.with_record(cost=Cost(fitting))
 
 
-def _in_world(wishes: Wishes, scene: Scene) -> Scene:
+def _in_world(options: Options, scene: Scene) -> Scene:
     """The scene in the world of the poses that were given."""
-    if wishes.viewmats is None:
+    if options.viewmats is None:
         return scene
     unit = scene.record.network_unit
     assert unit is not None, "`assemble` records it"
-    return in_world(scene, wishes.viewmats[0], unit)
+    return in_world(scene, options.viewmats[0], unit)
 
 
 def _with_cost(scene: Scene, timings: dict[str, float]) -> Scene:

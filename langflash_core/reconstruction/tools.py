@@ -24,7 +24,7 @@ from langflash_core.network.semantics.lifting import lifted_weights
 from langflash_core.network.semantics.outlines import Outlines
 from langflash_core.network.semantics.sam2 import Sam2, sam2_checkpoint
 from langflash_core.reconstruction.networks import Networks
-from langflash_core.reconstruction.wishes import Wishes
+from langflash_core.reconstruction.options import Options
 from langflash_core.types import Views
 
 
@@ -40,8 +40,8 @@ class Tools:
     finer: Detail | None
 
 
-def open_tools(wishes: Wishes, views: Views, networks: Networks, stored: Future[Stored] | None) -> Tools:
-    """Read what these wishes need.
+def open_tools(options: Options, views: Views, networks: Networks, stored: Future[Stored] | None) -> Tools:
+    """Read what these options need.
 
     Args:
         stored: the checkpoint, where its file is being read already.
@@ -50,29 +50,29 @@ def open_tools(wishes: Wishes, views: Views, networks: Networks, stored: Future[
         InputError: a word is unknown, or the preset does not have what it names.
         WeightsError: there are no weights for it.
     """
-    network = _network(wishes, networks, stored)
+    network = _network(options, networks, stored)
     return Tools(
         network,
-        atoms=_atoms(network, wishes.aggregation, views),
-        groups=_groups(network, wishes.grouping, wishes.device),
-        redrawn=_redrawn(wishes.grouping, wishes.device),
-        finer=None if wishes.detail is None or not network.surfaces else chosen_detail(wishes.detail),
+        atoms=_atoms(network, options.aggregation, views),
+        groups=_groups(network, options.grouping, options.device),
+        redrawn=_redrawn(options.grouping, options.device),
+        finer=None if options.detail is None or not network.surfaces else chosen_detail(options.detail),
     )
 
 
-def _network(wishes: Wishes, networks: Networks, stored: Future[Stored] | None) -> LangFlashNet:
+def _network(options: Options, networks: Networks, stored: Future[Stored] | None) -> LangFlashNet:
     """The network; a checkpoint that changed on disk is another one."""
-    path = None if wishes.weights is None else Path(wishes.weights).resolve()
+    path = None if options.weights is None else Path(options.weights).resolve()
     changed = path.stat().st_mtime_ns if path is not None and path.is_file() else 0
-    folder = part_folder(PRESETS[wishes.preset])
+    folder = part_folder(PRESETS[options.preset])
     installed = tuple((p.name, p.stat().st_mtime_ns) for p in sorted(folder.glob("*.safetensors")))
-    mixed = _bfloat16(wishes.preset, wishes.precision, wishes.device)
+    mixed = _bfloat16(options.preset, options.precision, options.device)
 
     def read() -> LangFlashNet:
         found = None if stored is None else stored.result()
-        return load_network(wishes.preset, path, wishes.device, bfloat16=mixed, stored=found)
+        return load_network(options.preset, path, options.device, bfloat16=mixed, stored=found)
 
-    return networks.get((wishes.preset, path, wishes.device, mixed, changed, installed), read)
+    return networks.get((options.preset, path, options.device, mixed, changed, installed), read)
 
 
 def _bfloat16(preset: str, precision: str, device: str) -> bool:

@@ -9,7 +9,6 @@ from torch import Tensor
 from langflash_core.errors import InputError
 from langflash_core.geometry.cameras import invert_rigid
 from langflash_core.images.straight import after, straightened
-from langflash_core.records import BentLens
 from langflash_core.types import Prediction, Views
 
 _STRAIGHTENED = 3  # times, at most
@@ -42,15 +41,13 @@ def straight_prediction(predict: Callable[[Views], Prediction], views: Views) ->
     for left in reversed(range(_STRAIGHTENED + 1)):
         if views.lenses is not None and not left:
             views = replace(views, lenses=replace(views.lenses, straight=True))
-        try:
-            return predict(views), views
-        except BentLens as bent:
-            assert views.lenses is not None, "bends are sought of lenses that are known"
-            before = views.lenses.straightened or (None,) * len(bent.found)
-            found = [
-                old if new is None else after(old, new) for old, new in zip(before, bent.found, strict=True)
-            ]
-            views = straightened(taken, found)
+        prediction = predict(views)
+        if not prediction.bent:
+            return prediction, views
+        assert views.lenses is not None, "bends are sought of lenses that are known"
+        before = views.lenses.straightened or (None,) * len(prediction.bent)
+        told = zip(before, prediction.bent, strict=True)
+        views = straightened(taken, [old if new is None else after(old, new) for old, new in told])
     raise AssertionError("the last round seeks no bends")
 
 

@@ -10,6 +10,7 @@ from torch.nn.functional import normalize
 
 from langflash_core.errors import InputError
 from langflash_core.geometry.cameras import invert_rigid
+from langflash_core.rig.rig import Rig
 from langflash_core.scene.consistency import seen_through
 from langflash_core.types import Cost, Gaussians, Prediction, Record, Scene, Semantics, Views
 
@@ -50,10 +51,8 @@ def assemble(prediction: Prediction, views: Views, *, top_m: int = 8, preset: st
         raise ValueError("viewmats: expected finite poses, received others")
     unit = mean_distance(prediction.gaussians.means[: height * width], prediction.viewmats[0])
     usable = _usable(prediction.gaussians)
-    keep = usable & ~seen_through(
-        prediction.gaussians.means, prediction.viewmats, views.Ks.to(prediction.viewmats),
-        prediction.depths, prediction.confidences,
-    )  # fmt: skip
+    points = prediction.gaussians.means.unflatten(0, (num_views, -1))
+    keep = usable & ~seen_through(rig_of(prediction, views), points).flatten()
     view_ids = torch.arange(num_views, device=keep.device).repeat_interleave(height * width)[keep]
     record = Record(
         preset=preset,
@@ -79,6 +78,12 @@ def assemble(prediction: Prediction, views: Views, *, top_m: int = 8, preset: st
     )
     timings = {**prediction.timings, "assembly": time.perf_counter() - start}
     return scene.with_record(cost=Cost(timings))
+
+
+def rig_of(prediction: Prediction, views: Views) -> Rig:
+    """The photos of a prediction, and what it says of where they are."""
+    Ks = views.Ks.to(prediction.viewmats)
+    return Rig(prediction.viewmats, Ks, prediction.depths, prediction.confidences, views.images)
 
 
 def unplaced_photos(prediction: Prediction, views: Views) -> dict[str, list[str]]:

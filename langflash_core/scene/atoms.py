@@ -10,6 +10,7 @@ from PIL import Image
 from torch.nn.functional import normalize
 
 from langflash_core.picture_files import STORED, opened_picture
+from langflash_core.rig.projected import project_points
 from langflash_core.scene.selection import strongest_atoms
 from langflash_core.scene.thin import covered_areas
 from langflash_core.types import Scene
@@ -101,16 +102,11 @@ def atom_pictures(scene: Scene) -> tuple[UInt8[np.ndarray, "_ _ 3"] | None, ...]
 def atom_cells(scene: Scene, view: int) -> Float[np.ndarray, "K h w"]:
     """(K, h, w): how much of each atom the cells of a photo show, of what is not hidden there."""
     camera = scene.camera(view)
-    viewmat, K = camera.viewmat.double().numpy(), camera.K.double().numpy()
-    pos_c = scene.gaussians.means.double().numpy() @ viewmat[:3, :3].T + viewmat[:3, 3]
-    z = pos_c[:, 2]
     width, height = -(-camera.width // CELL), -(-camera.height // CELL)
-    with np.errstate(all="ignore"):
-        x = (pos_c[:, 0] / z * K[0, 0] + K[0, 2]) / CELL
-        y = (pos_c[:, 1] / z * K[1, 1] + K[1, 2]) / CELL
-        inside = (z > 0) & (x >= 0) & (x < width) & (y >= 0) & (y < height)
-    rows = np.flatnonzero(inside)
-    cells = y[rows].astype(int) * width + x[rows].astype(int)
+    points, K = scene.gaussians.means.double().T, camera.K.double() / torch.tensor([[CELL], [CELL], [1]])
+    there = project_points(points, camera.viewmat.double(), K, (height, width))
+    rows, z = np.flatnonzero(there.inside.numpy()), there.z.numpy()
+    cells = there.pixels.numpy()[rows]
     nearest = np.full(width * height, np.inf)
     np.minimum.at(nearest, cells, z[rows])
     seen = z[rows] <= NEAR_ENOUGH * nearest[cells]

@@ -74,7 +74,7 @@ def assemble_detailed(
     detail: Detail,
     *,
     gaussians: int | None = None,
-    strangers: Bool[Tensor, "V H W"] | None = None,
+    transients: Bool[Tensor, "V H W"] | None = None,
     top_m: int = 8,
     preset: str = "mini",
     progress: Callable[[float], None] = lambda done: None,
@@ -85,7 +85,7 @@ def assemble_detailed(
         photos: (3, h, w) in [0, 1] of every view, `working_photo`; each may have its own size. Of many
             each is asked for several times and not kept.
         gaussians: about as many; None: as `detail` has it.
-        strangers: (V, H, W) bool, of the placed views: what gets no Gaussians; None: nothing.
+        transients: (V, H, W) bool, of the placed views: what gets no Gaussians; None: nothing.
         progress: called with the share that is done, twice a photo; what it raises ends the work.
 
     Returns:
@@ -103,7 +103,7 @@ def assemble_detailed(
     prediction, views = placed_views(prediction, views)
     if not bool(torch.isfinite(prediction.viewmats).all()):
         raise ValueError("viewmats: expected finite poses, received others")
-    known, keep, unit = _kept(prediction, views, strangers)
+    known, keep, unit = _kept(prediction, views, transients)
     sights = _Sights(lambda v: _Sight.of(photos[v], views.images[v], known[v].log(), keep[v]), len(photos))
     budget = gaussians or min(round(detail.most * int(keep.sum())), MOST_OF_LAYERS)
     trees, limit = _trees(sights, detail, budget, 0.0 if gaussians else detail.gain, progress)
@@ -191,7 +191,7 @@ class _Sights(Sequence[_Sight]):
         return self._known[index]
 
 
-def _kept(prediction: Prediction, views: Views, strangers: Tensor | None) -> tuple[Tensor, Tensor, float]:
+def _kept(prediction: Prediction, views: Views, transients: Tensor | None) -> tuple[Tensor, Tensor, float]:
     """Depths (V, H, W) with what is no number put right; cells (V, H, W) bool that get elements; the scene's
     unit."""
     usable = torch.isfinite(prediction.depths) & (prediction.depths > 0)
@@ -200,7 +200,7 @@ def _kept(prediction: Prediction, views: Views, strangers: Tensor | None) -> tup
     points = world_points(depths[:1], prediction.viewmats[:1], views.Ks[:1].to(depths))[0]
     nowhere = torch.where(usable[0].flatten()[:, None], points, torch.nan)
     unit = mean_distance(nowhere, prediction.viewmats[0])
-    return depths, usable if strangers is None else usable & ~strangers, unit
+    return depths, usable if transients is None else usable & ~transients, unit
 
 
 def _trees(

@@ -8,7 +8,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import KDTree
 
-from langflash_core.geometry.cameras import pictured
+from langflash_core.rig.projected import project_points
 from langflash_core.types import Gaussians, Scene
 
 LINK = 4.0
@@ -106,11 +106,10 @@ def _shown_at(
     """The part of which a photo's layer shows something where each of some Gaussians is: at its pixel, and at
     its depth to within `SAME`; -1 where it does not."""
     viewmat, K = (values.detach().cpu().double() for values in (scene.viewmats[view], scene.Ks[view]))
-    columns, lines, depths = (values.numpy() for values in pictured(viewmat, K, means))
     width, height = scene.view_size
-    inside = (depths > 0) & (columns >= 0) & (columns < width) & (lines >= 0) & (lines < height)
-    pixels = np.where(inside, np.floor(lines) * width + np.floor(columns), 0).astype(int)
-    logs = np.log(np.where(inside, depths, 1.0))
+    there = project_points(means, viewmat, K, (height, width))
+    inside, pixels = there.inside.numpy(), there.pixels.numpy()
+    logs = np.log(np.where(inside, there.z.numpy(), 1.0))
     shown, deep = np.full(width * height, -1), np.zeros(width * height)
     own = np.flatnonzero(inside & of_view)
     own = own[np.argsort(-logs[own], kind="stable")]  # of several in a pixel the nearest stays

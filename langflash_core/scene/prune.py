@@ -14,8 +14,8 @@ from dataclasses import dataclass, replace
 import torch
 from torch import Tensor
 
-from langflash_core.geometry.cameras import pictured
 from langflash_core.geometry.harmonics import SH_C0
+from langflash_core.rig.projected import project_points
 from langflash_core.scene.assemble import renormalised
 from langflash_core.scene.fields import stored_bytes
 from langflash_core.types import Gaussians, Scene, Semantics
@@ -105,8 +105,10 @@ def _parents(sight: _Sight, scene: Scene, radius: float, colour_tolerance: float
 
 def _pixels(points: Tensor, scene: Scene, view: int) -> tuple[Tensor, Tensor]:
     """Columns and lines (n,) of world points (3, n) in a view; far outside where they lie behind it."""
-    x, y, z = pictured(scene.viewmats[view], scene.Ks[view], points)
-    return torch.where(z > 0, x, -1e6).clamp(-1e6, 1e6), torch.where(z > 0, y, -1e6).clamp(-1e6, 1e6)
+    width, height = scene.view_size
+    there = project_points(points, scene.viewmats[view], scene.Ks[view], (height, width))
+    x, y = (torch.where(there.z > 0, along, -1e6).clamp(-1e6, 1e6) for along in (there.x, there.y))
+    return x, y
 
 
 def _pixel_map(sight: _Sight, rows: Tensor, scene: Scene, view: int) -> Tensor:

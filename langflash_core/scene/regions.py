@@ -31,8 +31,9 @@ from scipy.ndimage import distance_transform_edt
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
-from langflash_core.geometry.cameras import invert_rigid, pictured, world_points
+from langflash_core.geometry.cameras import invert_rigid, world_points
 from langflash_core.geometry.harmonics import SH_C0
+from langflash_core.rig.projected import project_points
 from langflash_core.scene.instances import touching
 from langflash_core.scene.selection import strongest_atoms
 from langflash_core.scene.thin import covered_areas
@@ -45,7 +46,7 @@ THING = (0.06, 0.30)
 GROWTH, OF_ONE = 0.2, 0.15
 """Powers of what tells a thing, beside how long its border holds: by how much the next region is larger, and
 how much of it is of the atom that was clicked. All numbers here were chosen on 12 held-out rooms (seeds
-900000200 to 211) beyond those that are judged; these and `THING` also on the things of `tests.tools.clicks`."""
+900000200 to 211) beyond the judged ones; these and `THING` also on what `tests.tools.clicks` outlines."""
 _MOST_GROWTH = 4.0
 _SIZE = 0.25
 _STEP = 0.03  # of the logarithm of depth from a pixel to the next, beyond twice the steps beside: a jump
@@ -260,7 +261,8 @@ class _Grid:
         rows = np.flatnonzero(some)
         viewmat, K = (values[view].detach().cpu().double() for values in (scene.viewmats, scene.Ks))
         points = scene.gaussians.means.detach().cpu()[torch.from_numpy(rows)].double().T.contiguous()
-        x, y, z = (values.numpy() for values in pictured(viewmat, K, points))
+        there = project_points(points, viewmat, K, (height, width))
+        x, y, z = (values.numpy() for values in (there.x, there.y, there.z))
         inside = (z > 1e-8) & (x >= -width) & (x < 2 * width) & (y >= -height) & (y < 2 * height)
         rows, z = rows[inside], np.log(z[inside])
         at = y[inside].clip(0, height - 1).astype(int) * width + x[inside].clip(0, width - 1).astype(int)
@@ -350,11 +352,11 @@ def _same_places(scene: Scene, grid: _Grid, other: _Grid) -> tuple[np.ndarray, n
     mats, Ks = (values.detach().cpu().double() for values in (scene.viewmats, scene.Ks))
     depths = torch.from_numpy(np.exp(grid.depths))[None]
     points = world_points(depths, mats[grid.view][None], Ks[grid.view][None])[0].reshape(-1, 3).T
-    x, y, z = (values.numpy() for values in pictured(mats[other.view], Ks[other.view], points.contiguous()))
     height, width = other.front.shape
-    inside = (z > 1e-8) & (x >= 0) & (x < width) & (y >= 0) & (y < height) & (grid.front.ravel() >= 0)
-    there = np.where(inside, np.floor(y) * width + np.floor(x), 0).astype(int)
-    same = np.abs(np.log(np.where(inside, z, 1.0)) - other.depths.ravel()[there]) <= _SAME
+    projected = project_points(points.contiguous(), mats[other.view], Ks[other.view], (height, width))
+    inside = projected.inside.numpy() & (grid.front.ravel() >= 0)
+    there = np.where(inside, projected.pixels.numpy(), 0)
+    same = np.abs(np.log(np.where(inside, projected.z.numpy(), 1.0)) - other.depths.ravel()[there]) <= _SAME
     same &= inside & (other.front.ravel()[there] >= 0)
     return np.flatnonzero(same), there[same]
 

@@ -17,14 +17,15 @@ from jaxtyping import Bool, Float
 from torch import Tensor
 from torch.nn import functional as F
 
-from langflash_core.geometry.cameras import invert_rigid, pictured, world_points
+from langflash_core.geometry.cameras import invert_rigid
+from langflash_core.rig.projected import project_points
+from langflash_core.rig.rig import Rig
 from langflash_core.splat.compose import Chosen, Nearness, shares
 from langflash_core.types import Camera
 
 CELL = 3
 """Pixels a side: a neighbour up to three times as far away still leaves a point in each."""
 _FRONT = 0.1  # of the depth behind the nearest point of a cell, within which others are its surface, too
-_LEAST_DEPTH = 1e-6  # unit of the depths
 _GREY = (0.299, 0.587, 0.114)
 
 
@@ -46,39 +47,31 @@ class Foresight:
 
 
 @torch.no_grad()
-def foresight(
-    images: Float[Tensor, "V 3 H W"],
-    depths: Float[Tensor, "V H W"],
-    viewmats: Float[Tensor, "V 4 4"],
-    Ks: Float[Tensor, "V 3 3"],
-) -> Foresight:
+def foresight(rig: Rig) -> Foresight:
     """What the nearest photos foresee of each one, of two and more.
 
     Args:
-        images: in [0, 1], in one light. depths: z > 0, finite. viewmats: of photos whose place is known. Ks:
-            pixels.
+        rig: with photos in one light, whose places are known; depths are finite.
     """
-    found = []
-    for view, image in enumerate(images):
-        camera = Camera(viewmats[view], Ks[view], depths.shape[2], depths.shape[1])
-        chosen = _beside(view, viewmats, depths, camera)
-        others = list(chosen.views)
-        points = world_points(depths[others], viewmats[others], Ks[others])
+    assert rig.photos is not None, "whoever compares photos has them"
+    found, (height, width) = [], rig.size
+    for view, image in enumerate(rig.photos):
+        camera = Camera(rig.viewmats[view], rig.Ks[view], width, height)
+        chosen = _beside(rig, view, camera)
         pictures = [
-            _pointed(own.T, images[other].flatten(1), camera)
-            for own, other in zip(points, others, strict=True)
+            _pointed(rig.points(other), rig.photos[other].flatten(1), camera) for other in chosen.views
         ]
         picture, shown = _blended(pictures, chosen)
         alike = _alike(picture, F.avg_pool2d(image, CELL), shown)
-        found.append((float(shown.float().mean()), alike, others[0]))
+        found.append((float(shown.float().mean()), alike, chosen.views[0]))
     return Foresight(*(tuple(column) for column in zip(*found, strict=True)))
 
 
-def _beside(view: int, viewmats: Tensor, depths: Tensor, camera: Camera) -> Chosen:
+def _beside(rig: Rig, view: int, camera: Camera) -> Chosen:
     """The other photos that a picture at a photo's place would be drawn from."""
-    poses = invert_rigid(viewmats.double()).cpu().numpy()
-    others = [other for other in range(len(viewmats)) if other != view]
-    distance = float(depths[view].nanmedian())
+    poses = invert_rigid(rig.viewmats.double()).cpu().numpy()
+    others = [other for other in range(len(rig)) if other != view]
+    distance = float(rig.depths[view].nanmedian())
     return Nearness(poses[others, :3, 3], poses[others, :3, 2], distance, tuple(others)).chosen(camera)
 
 
@@ -98,10 +91,9 @@ def _pointed(
     """Mean colours of the nearest points in each cell of a picture, and their depth; endless where there are
     none."""
     height, width = camera.height // CELL, camera.width // CELL
-    x, y, z = pictured(camera.viewmat, camera.K, points)
-    inside = (z > _LEAST_DEPTH) & (x >= 0) & (y >= 0) & (x < CELL * width) & (y < CELL * height)
-    some = inside.nonzero()[:, 0]
-    z, places = z[some], y[some].long() // CELL * width + x[some].long() // CELL
+    there = project_points(points, camera.viewmat, camera.K, (CELL * height, CELL * width))
+    some = there.inside.nonzero()[:, 0]
+    z, places = there.z[some], there.y[some].long() // CELL * width + there.x[some].long() // CELL
     nearest = z.new_full((height * width,), torch.inf).scatter_reduce(0, places, z, "amin")
     front = z < (1 + _FRONT) * nearest[places]
     some, places = some[front], places[front]

@@ -15,7 +15,7 @@ from app.gl.layered import MOVING
 from langflash_core import pipeline
 from langflash_core.export.html import write_html
 from langflash_core.export.page_columns import PLACE_STEPS
-from langflash_core.geometry.cameras import pictured
+from langflash_core.geometry.cameras import project, transform
 from langflash_core.splat import compose
 from langflash_core.types import Scene
 from tests.app.gl.test_gl_layers import layered
@@ -58,10 +58,9 @@ def test_layers_come_back_within_the_steps_of_their_photos(tmp_path):
     for view in range(3):
         own = ids == view
         places = [
-            torch.stack(
-                pictured(scene.viewmats[view].double(), scene.Ks[view].double(), g.means[own].double().T)
-            )
+            torch.cat((project(pos_c, scene.Ks[view].double()), pos_c[:, 2:]), 1).T
             for g in (found, ours.gaussians)
+            for pos_c in [transform(scene.viewmats[view].double(), g.means[own].double())]
         ]
         apart = torch.stack(
             [(places[0][:2] - places[1][:2]).abs().amax(), (places[0][2] / places[1][2]).log().abs().amax()]

@@ -11,7 +11,6 @@ from langflash_core.geometry.cameras import (
     fov_degrees,
     intrinsics_from_fov,
     invert_rigid,
-    pictured,
     pixel_grid,
     project,
     rotation_angle_degrees,
@@ -75,18 +74,3 @@ def test_rotation_angles_are_exact_at_both_ends(degrees):
     turn = torch.from_numpy(Rotation.from_rotvec(np.radians(degrees) * np.array([0.6, 0, 0.8])).as_matrix())
     base = _pose(3)[:3, :3]
     assert rotation_angle_degrees(base, base @ turn).item() == pytest.approx(degrees, abs=1e-6)
-
-
-def test_pictured_is_transform_and_project():
-    torch.manual_seed(0)
-    viewmat, K = (
-        torch.eye(4, dtype=torch.float64),
-        torch.tensor([[30.0, 0, 16], [0, 31.0, 12], [0, 0, 1]]).double(),
-    )
-    viewmat[:3, :3] = torch.linalg.qr(torch.randn(3, 3, dtype=torch.float64)).Q
-    viewmat[:3, 3] = torch.randn(3, dtype=torch.float64)
-    points = torch.randn(50, 3, dtype=torch.float64)
-    pos_c = transform(viewmat, points)
-    expected = torch.cat((project(pos_c, K), pos_c[:, 2:]), 1)
-    found = torch.stack(pictured(viewmat, K, points.T), 1)
-    assert torch.allclose(found, expected, rtol=1e-12, atol=1e-9)  # of points behind, pixels are huge

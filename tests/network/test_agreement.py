@@ -8,18 +8,23 @@ from scipy.optimize import minimize
 from langflash_core.geometry.cameras import rays, unproject
 from langflash_core.network.stereo import agreement
 from langflash_core.network.stereo.agreement import (
-    agreed,
     blended,
     carried,
     knot_weights,
     straightened,
 )
 from langflash_core.network.stereo.prior import DepthMaps
-from langflash_core.network.stereo.sweep import everyone
+from langflash_core.rig.neighbours import everyone
+from langflash_core.rig.rig import Rig
 
 HEIGHT, WIDTH = 48, 64
 K = torch.tensor([[60.0, 0, 32], [0, 60.0, 24], [0, 0, 1]], dtype=torch.float64)
 KS = K.expand(2, 3, 3)
+
+
+def agreed(maps: DepthMaps, viewmats: torch.Tensor, Ks: torch.Tensor, *near) -> DepthMaps:
+    found = agreement.agreed(Rig.of_logs(maps.log_depths, viewmats, Ks, maps.log_errors), *near)
+    return DepthMaps(found.log_depths, found.log_errors)
 
 
 def _wall(dtype: torch.dtype = torch.float64) -> tuple[torch.Tensor, torch.Tensor]:
@@ -35,8 +40,8 @@ def _wall(dtype: torch.dtype = torch.float64) -> tuple[torch.Tensor, torch.Tenso
 
 def _gap(logs: torch.Tensor, viewmats: torch.Tensor) -> torch.Tensor:
     """How far view 0's points lie from view 1's surface, of log depth."""
-    points = unproject(logs[0].exp(), K.to(logs)).flatten(0, 1)
-    there = carried(points, viewmats, KS.to(logs), 0, 1, (HEIGHT, WIDTH))
+    points = unproject(logs[0].exp(), K.to(logs)).flatten(0, 1).T
+    there = carried(Rig.of_logs(logs, viewmats, KS.to(logs)), 0, 1, points)
     return (agreement.sampled(logs[1], there.places) - there.log_depths)[there.inside]
 
 
@@ -53,7 +58,7 @@ def test_a_slow_difference_goes():
     x = torch.linspace(-1, 1, WIDTH, dtype=torch.float64)
     bent = torch.stack((logs[0] + 0.02 * x, logs[1] - 0.02 - 0.015 * x))
     before = _gap(bent, viewmats).abs().median()
-    straight = straightened(bent, viewmats, KS, everyone(2))
+    straight = straightened(Rig.of_logs(bent, viewmats, KS), everyone(2))
     assert _gap(straight, viewmats).abs().median() < 0.35 * before
     both = agreed(DepthMaps(bent, torch.full_like(logs, -3.0)), viewmats, KS)
     assert _gap(both.log_depths, viewmats).abs().median() < 0.05 * before
@@ -63,7 +68,7 @@ def test_the_surer_photo_counts_more():
     logs, viewmats = _wall()
     moved = torch.stack((logs[0], logs[1] + 0.03))
     errors = torch.stack((torch.full_like(logs[0], -4.0), torch.full_like(logs[1], -2.0)))
-    mean = blended(moved, errors, viewmats, KS, everyone(2))
+    mean = blended(Rig.of_logs(moved, viewmats, KS, errors), everyone(2))
     inside = (slice(8, -8), slice(24, -8))
     assert (mean[0] - logs[0])[inside].abs().max() < 0.002  # 1 / (1 + e^4) of .03
     assert (mean[1] - logs[1])[8:-8, 8:-24].abs().max() < 0.002
@@ -94,17 +99,18 @@ def test_the_least_squares_step_is_that_of_scipy():
     logs, viewmats = _wall()
     bent = torch.stack((logs[0], logs[1] + 0.02))
     sparse = (slice(2, None, 4), slice(2, None, 4))
-    points = [unproject(own.exp(), K)[sparse].flatten(0, 1) for own in bent]
+    rig = Rig.of_logs(bent, viewmats, KS)
+    points = [unproject(own.exp(), K)[sparse].flatten(0, 1).T for own in bent]
     grid = torch.stack(torch.meshgrid(torch.arange(WIDTH), torch.arange(HEIGHT), indexing="xy"), -1) + 0.5
     places = (grid.double() / torch.tensor([WIDTH, HEIGHT]) * 2 - 1)[sparse].flatten(0, 1)
     own_hats = knot_weights(places)
-    normal, right = agreement._comparisons(bent, points, own_hats, viewmats, KS, everyone(2))
+    normal, right = agreement._comparisons(rig, points, own_hats, everyone(2))
     prior = agreement._expectation(bent.device)
     solved = torch.linalg.solve(normal + torch.block_diag(prior, prior), right).numpy()
 
     rows, gaps, weights = [], [], []
     for a, b in ((0, 1), (1, 0)):
-        there = carried(points[a], viewmats, KS, a, b, (HEIGHT, WIDTH))
+        there = carried(rig, a, b, points[a])
         gap = (agreement.sampled(bent[b], there.places) - there.log_depths)[there.inside]
         pair = torch.zeros(len(gap), 2, 25, dtype=torch.float64)
         pair[:, a], pair[:, b] = own_hats[there.inside], -knot_weights(there.places[there.inside])

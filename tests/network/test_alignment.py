@@ -5,12 +5,12 @@ import pytest
 from scipy.optimize import minimize
 
 from langflash_core.network.stereo.alignment import (
-    _PRIOR_ERROR,
     _PRIOR_SIGMAS,
     INDEPENDENT,
     NO_CORRECTION,
     fit_correction,
 )
+from langflash_core.rig.settings import STRAIGHTENING
 
 
 def _points(seed: int, n: int = 120, outliers: float = 0.0):
@@ -40,7 +40,7 @@ def test_a_smooth_error_is_taken_out(outliers):
 def test_the_optimum_is_that_of_scipy():
     x, priors, targets, sigmas = _points(1, outliers=0.2)
     design = np.column_stack((np.ones(len(x)), x, priors - priors.mean()))
-    total = np.hypot(sigmas, _PRIOR_ERROR)
+    total = np.hypot(sigmas, STRAIGHTENING.prior_error)
 
     def cost(b):
         residuals = (targets - priors - design @ b) / total

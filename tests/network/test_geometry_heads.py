@@ -10,10 +10,10 @@ from torch.nn import functional as F
 from langflash_core.geometry.cameras import invert_rigid, rays
 from langflash_core.geometry.quaternions import quats_to_matrices
 from langflash_core.network.gaussians import CHANNELS, assemble_gaussians, footprints
-from langflash_core.network.guided import _one_by_one
 from langflash_core.network.model import pooled_weights
 from langflash_core.network.stereo.prior import DepthMaps
 from langflash_core.network.stereo.sharpening import sharpened
+from langflash_core.network.stereo.surfaces import one_by_one
 from langflash_core.network.stereo.sweep import Compared, gathered, patches, sweep_correlation
 from tests.geometry.spread import covariances
 
@@ -240,9 +240,12 @@ def test_views_one_by_one_give_what_all_at_once_do(untrained):
     torch.manual_seed(0)
     images = torch.rand(3, 3, 56, 70)
     depths = (images[:, 0] > 0.5) + torch.rand(3, 56, 70) / 10
-    for work, of_views in ((untrained.local, (images,)), (sharpened, (depths, images))):
-        # The same sums; a convolution may order them otherwise for another batch.
-        torch.testing.assert_close(_one_by_one(work, *of_views), work(*of_views), atol=1e-5, rtol=0)
+    # The same sums; a convolution may order them otherwise for another batch.
+    torch.testing.assert_close(
+        one_by_one(untrained.local, images), untrained.local(images), atol=1e-5, rtol=0
+    )
+    found = one_by_one(sharpened, depths, images)
+    torch.testing.assert_close(found, sharpened(depths, images), atol=1e-5, rtol=0)
 
 
 def test_weights_are_pooled_as_adaptive_pooling_has_them():

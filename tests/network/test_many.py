@@ -14,6 +14,7 @@ from langflash_core.network.presets import MINI
 from langflash_core.network.semantics.aggregation import average_atoms
 from langflash_core.network.semantics.grouping import SemanticGrouping, surviving, surviving_of
 from langflash_core.network.semantics.splitting import condensed
+from langflash_core.network.stereo import cameras
 from langflash_core.network.stereo.prior import DepthMaps
 from langflash_core.network.stereo.retrieval import most_alike
 
@@ -217,6 +218,6 @@ def test_few_directions_of_many_photos_keep_cosines():
 def test_what_poses_are_found_by_holds_the_depth_of_all_photos_once():
     logs = torch.zeros(1, VIEWS, 8, 8)
     Ks = torch.eye(3).expand(VIEWS, 3, 3)
-    inputs = GuidedDepthNet._pose_inputs(Ks, (8, 8), DepthMaps(logs, logs), torch.zeros(VIEWS, 4, 2, 2))
+    inputs = cameras._pose_inputs(Ks, (8, 8), DepthMaps(logs, logs), torch.zeros(VIEWS, 4, 2, 2))
     starts = {view.depth.__array_interface__["data"][0] for view in inputs}
     assert max(starts) - min(starts) == (VIEWS - 1) * 8 * 8 * 4  # one block, view after view

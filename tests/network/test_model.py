@@ -6,8 +6,10 @@ import torch
 from safetensors.torch import save_file
 
 from langflash_core.errors import Cancelled, WeightsError
-from langflash_core.network import MINI, GuidedDepthNet, initial_network, load_network, save_network
+from langflash_core.network import MINI, GuidedDepthNet, guided, initial_network, load_network, save_network
 from langflash_core.network.checkpoints.files import dequantise, quantise, start_from
+from langflash_core.network.stereo.poses import Poses
+from langflash_core.records import FoundFocal
 from langflash_core.types import Prediction, Views
 
 
@@ -159,3 +161,12 @@ def test_damaged_weights_are_refused_in_one_sentence(untrained, tmp_path, kind):
     with pytest.raises(WeightsError) as caught:
         load_network("mini", path)
     assert "\n" not in str(caught.value)
+
+
+def test_photos_that_bend_lines_are_handed_back(untrained, monkeypatch):
+    """As a value, before anything rests on straight lines."""
+    lens = FoundFocal(1.0, 0.01, 3, -0.05, 0.001)
+    monkeypatch.setattr(guided, "find_poses", lambda *of: Poses.of_bent((lens,), 2))
+    found = untrained.predict(_views(_pattern(2)))
+    assert found.bent == (lens,) and len(found.depths) == len(found.gaussians) == 0
+    assert "poses" in found.timings and "grouping" not in found.timings

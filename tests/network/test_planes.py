@@ -7,7 +7,8 @@ import pytest
 import torch
 
 from langflash_core.geometry.cameras import rays
-from langflash_core.network.stereo.planes import RADII, fitted_planes, flattened
+from langflash_core.network.stereo.planes import fitted_planes, flattened
+from langflash_core.rig.settings import FLATTENING
 
 SIZE = (96, 112)
 K = torch.tensor([[100.0, 0, 56], [0, 100.0, 48], [0, 0, 1]], dtype=torch.float64)
@@ -63,10 +64,10 @@ def test_a_corner_of_two_walls_keeps_its_depth():
     x = rays(K, SIZE[1], SIZE[0])[..., 0]
     corner = (2 / (1 + x.abs())).log()[None]
     changed = (flattened(corner, _errors(0.08)) - corner).abs()
-    assert changed.max() < 0.02 and changed[:, :, : 56 - 2 * max(RADII) - 2].max() < 1e-9
+    assert changed.max() < 0.02 and changed[:, :, : 56 - 2 * max(FLATTENING.radii) - 2].max() < 1e-9
 
 
-@pytest.mark.parametrize("radius", RADII)
+@pytest.mark.parametrize("radius", FLATTENING.radii)
 def test_planes_are_those_of_least_squares(radius):
     """numpy's lstsq in a window of every kind of place is the twin."""
     maps = torch.rand(2, 1, 19, 23, dtype=torch.float64, generator=torch.Generator().manual_seed(0)) + 1

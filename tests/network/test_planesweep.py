@@ -18,8 +18,9 @@ from langflash_core.network.stereo.planesweep import (
     _planes,
     _Scene,
     _Windows,
-    searched,
 )
+from langflash_core.rig.rig import Rig
+from langflash_core.rig.settings import PLANE_SWEEP
 
 WIDTH, HEIGHT, LARGE = 96, 72, 3
 K = torch.tensor([[80.0, 0, 48], [0, 80.0, 36], [0, 0, 1]])
@@ -27,6 +28,10 @@ WALL, THING = 3.0, 1.2
 SIDE = 0.2  # half, of the square thing
 PLACES = ((0.0, 0.0, 0.0), (0.3, 0.02, 0.0), (-0.25, 0.1, 0.05), (0.05, -0.3, -0.05))
 ALL = [[other for other in range(4) if other != view] for view in range(4)]
+
+
+def searched(logs: Tensor, photos: list[np.ndarray], poses: Tensor, Ks: Tensor, *more) -> Tensor:
+    return planesweep.searched(Rig.of_logs(logs, poses, Ks), photos, *more).log_depths
 
 
 def surface(seed: int) -> np.ndarray:
@@ -73,7 +78,7 @@ def room(thing: bool = True) -> tuple[list[np.ndarray], Tensor, Tensor]:
 
 
 KS = K.expand(4, 3, 3)
-STEP = 2 * THING / WALL / (planesweep._PLANES - 1)
+STEP = 2 * THING / WALL / (PLANE_SWEEP.planes - 1)
 """Of log depth at the thing, from a plane to the next, where these end at twice the thing's inverse depth."""
 
 
@@ -89,15 +94,15 @@ def test_a_thing_before_the_wall_is_found_where_it_is():
         outside = cv2.dilate(thing, np.ones((13, 13))) == 0
         outside[:18, :20] = False
         assert inside.sum() > 100
-        assert np.quantile(abs((own - real).numpy()[inside]), 0.9) < STEP / 2 + planesweep._ERROR
-        assert np.quantile(abs((own - real).numpy()[outside]), 0.95) < planesweep._ERROR
+        assert np.quantile(abs((own - real).numpy()[inside]), 0.9) < STEP / 2 + PLANE_SWEEP.error
+        assert np.quantile(abs((own - real).numpy()[outside]), 0.95) < PLANE_SWEEP.error
 
 
 def test_a_wall_that_is_right_stays():
     photos, truth, wall = room(thing=False)
     found = searched(wall, photos, viewmats(), KS, ALL)
     assert torch.equal(truth, wall)
-    assert (found - wall).abs().max() < planesweep._ERROR
+    assert (found - wall).abs().max() < PLANE_SWEEP.error
 
 
 @pytest.mark.parametrize("near", [[[1], [0], [3], [2]], [[], [], [], []]])
@@ -182,9 +187,9 @@ def test_correlations_are_those_of_float64():
                 for picture in (left, right)
             )
             both = ((a - a.mean()) * (b - b.mean())).mean()
-            twin[row, column] = both / math.sqrt(a.var() * b.var() + planesweep._NOISE**4)
+            twin[row, column] = both / math.sqrt(a.var() * b.var() + PLANE_SWEEP.noise**4)
     inner = (slice(2, 38), slice(2, 48))
-    assert abs(found - twin)[inner].max() < 4 * 255**2 * 25 * 2**-24 / planesweep._NOISE**2
+    assert abs(found - twin)[inner].max() < 4 * 255**2 * 25 * 2**-24 / PLANE_SWEEP.noise**2
     assert found[10:30, 30:45].min() > 0.9
 
 
@@ -210,5 +215,5 @@ def test_between_planes_a_parabola_has_its_peak():
 def test_planes_are_as_far_apart_in_inverse_depth_and_cover_the_map():
     logs = np.log(np.linspace(1, 4, 1000, dtype=np.float32)).reshape(20, 50)
     planes = _planes(logs)
-    assert len(planes) == planesweep._PLANES and np.ptp(np.diff(planes)) < 1e-6
+    assert len(planes) == PLANE_SWEEP.planes and np.ptp(np.diff(planes)) < 1e-6
     assert planes[0] < 1 / 3.9 and planes[-1] > 1.9

@@ -16,6 +16,7 @@ from langflash_core.network.stereo.matching import (
     relative_pose,
 )
 from langflash_core.network.stereo.poses import PoseInput, estimate_poses
+from langflash_core.rig.settings import Pairing
 
 SIGMA = 1 / 600  # one pixel at a focal length of 600
 
@@ -188,7 +189,7 @@ def test_where_the_best_pair_does_not_connect_photos_the_next_best_is_asked(trie
     views = [PoseInput(np.eye(3), (6, 4), flat, flat[None]) for _ in range(4)]
     asked = []
 
-    def posed(view_i, view_j, matches):
+    def posed(view_i, view_j, matches, settings):
         edge = (
             next(i for i in range(4) if views[i] is view_i),
             next(j for j in range(4) if views[j] is view_j),
@@ -201,7 +202,6 @@ def test_where_the_best_pair_does_not_connect_photos_the_next_best_is_asked(trie
 
     monkeypatch.setattr(poses, "_pair_pose", posed)
     monkeypatch.setattr(poses, "dense_matches", lambda *of: Matches(np.zeros((0, 2)), np.zeros((0, 2)), 0.01))
-    monkeypatch.setattr(poses, "_BRIDGES", tried)
-    found, agreed = poses._pair_poses(views, edges, lambda: None)
+    found, agreed = poses._pair_poses(views, edges, lambda: None, Pairing(bridges=tried))
     assert asked[5:] == [(1, 2), (0, 2)][:tried] and set(agreed) == set(found)
     assert set(found) == {(0, 1), (2, 3), *([(0, 2)] if tried > 1 else [])}

@@ -16,15 +16,13 @@ import torch
 from torch import Tensor
 from torch.nn import functional as F
 
-from langflash_core.network.guided import _agreed
-from langflash_core.network.stereo import registration
-from langflash_core.network.stereo.poses import Poses
-from langflash_core.network.stereo.prior import DepthMaps
 from langflash_core.network.stereo.registration import (
-    _STIFF,
     registered,
     smooth,
 )
+from langflash_core.network.stereo.surfaces import flatten, one_surface, sharpen
+from langflash_core.rig.rig import Rig
+from langflash_core.rig.settings import REGISTRATION
 from langflash_core.running import Run
 from langflash_core.types import Views
 
@@ -32,7 +30,7 @@ WIDTH, HEIGHT, RATIO = 84, 63, 3
 K = torch.tensor([[70.0, 0, 42], [0, 70.0, 31.5], [0, 0, 1]])
 LARGE = K * torch.tensor([[RATIO], [RATIO], [1.0]])
 BEND = 0.03
-FLOW_ERROR = registration._FLOW_ERROR
+FLOW_ERROR = REGISTRATION.flow_error
 ONE_GREY = np.full((HEIGHT, WIDTH), 128, np.float32)
 
 Plane = tuple[tuple[float, float, float], float]
@@ -51,9 +49,10 @@ class Room:
     viewmats: Tensor
 
     def registered(self, logs: Tensor, **more) -> Tensor:
-        maps = DepthMaps(logs, torch.full_like(logs, -2.5))
-        found = registered(maps, self.photos, self.viewmats, K.expand(len(logs), 3, 3), **more)
-        assert found.log_errors is maps.log_errors
+        errors = torch.full_like(logs, -2.5)
+        rig = Rig.of_logs(logs, self.viewmats, K.expand(len(logs), 3, 3), errors)
+        found = registered(rig, self.photos, **more)
+        assert found.log_errors is errors
         return found.log_depths
 
 
@@ -110,8 +109,8 @@ def bend() -> Tensor:
     return BEND * torch.cos(math.pi * y)[:, None] * torch.cos(math.pi * x)
 
 
-OWN = 1 / (registration._ALIKE * registration._EXPECTED**2)
-BENDING = _STIFF * ((math.pi / HEIGHT) ** 2 + (math.pi / WIDTH) ** 2)
+OWN = 1 / (REGISTRATION.alike * REGISTRATION.expected**2)
+BENDING = REGISTRATION.stiff * ((math.pi / HEIGHT) ** 2 + (math.pi / WIDTH) ** 2)
 """What holds a cell where it is, and what a bend of half a wave each way costs it."""
 
 
@@ -131,8 +130,8 @@ def kept(seen: Room, cost: float) -> float:
     """
     others = len(seen.photos) - 1
     slowest = min(moves(seen, view) for view in range(len(seen.photos)))
-    each = 0.45 * (slowest / FLOW_ERROR) ** 2 / registration.ONE_SHIFT
-    rounds = registration._ROUNDS if others > 1 else (1,)
+    each = 0.45 * (slowest / FLOW_ERROR) ** 2 / REGISTRATION.one_shift
+    rounds = REGISTRATION.rounds if others > 1 else (1,)
     return math.prod(cost / (min(most, others) * each + cost) for most in rounds)
 
 
@@ -161,7 +160,7 @@ def test_true_depth_stays(places):
     seen = room(places)
     changed = (seen.registered(seen.logs) - seen.logs).abs()
     for view, change in enumerate(changed):
-        assert change.mean() < FLOW_ERROR / moves(seen, view) / math.sqrt(registration._ALIKE)
+        assert change.mean() < FLOW_ERROR / moves(seen, view) / math.sqrt(REGISTRATION.alike)
 
 
 def test_twice_is_the_same_to_the_last_bit_and_what_is_given_stays(pair):
@@ -253,7 +252,7 @@ def test_a_blank_wall_moves_with_what_is_textured_beside_it():
     change = (seen.registered(seen.logs + BEND) - seen.logs - BEND)[0, 8:-8].mean(0) / -BEND
     middle = WIDTH // 2
     assert change[20 : middle - 6].mean() == pytest.approx(1 - kept(seen, OWN), abs=0.05)
-    away = (WIDTH - 0.5 - torch.arange(middle + 4, WIDTH)) * math.sqrt(OWN / _STIFF)
+    away = (WIDTH - 0.5 - torch.arange(middle + 4, WIDTH)) * math.sqrt(OWN / REGISTRATION.stiff)
     expected = change[middle + 4] * away.cosh() / away[0].cosh()
     assert (change[middle + 4 :] - expected).abs().max() < 0.02
 
@@ -295,10 +294,10 @@ def test_flow_errors_along_a_line_bend_neither_it_nor_the_wall():
     """
     error, line = FLOW_ERROR / moves(room(PAIR), 0), slice(40, 43)
     weight = torch.zeros(HEIGHT, WIDTH)
-    weight[:, line] = 1 / error**2 / registration.ONE_SHIFT
-    q = np.sqrt((np.pi * np.arange(2, 13) / HEIGHT) ** 2 + OWN / _STIFF)
+    weight[:, line] = 1 / error**2 / REGISTRATION.one_shift
+    q = np.sqrt((np.pi * np.arange(2, 13) / HEIGHT) ** 2 + OWN / REGISTRATION.stiff)
     across = 3 * float(weight.max())
-    falls = across / (across + 2 * _STIFF * q)
+    falls = across / (across + 2 * REGISTRATION.stiff * q)
     assert math.sqrt(2 / 13 * (falls**2).sum()) < 1 / 5
     assert math.sqrt(2 / 13 * ((falls * np.exp(-10 * q)) ** 2).sum()) < 1 / 20
     bent = []
@@ -340,7 +339,7 @@ def test_depths_that_are_no_numbers_stay_alone(value, pair):
 def test_far_and_near_stay_finite(depth, pair):
     wild = torch.full_like(pair.logs, depth)
     found = pair.registered(wild)
-    assert found.isfinite().all() and (found - wild).abs().max() <= registration._FARTHEST + 1e-5
+    assert found.isfinite().all() and (found - wild).abs().max() <= REGISTRATION.farthest + 1e-5
 
 
 @pytest.mark.parametrize("size", [(1, 1), (1, 30), (3, 3), (4, 4), (2, 33), (33, 2)])
@@ -349,7 +348,7 @@ def test_small_maps(size):
     logs = torch.zeros(2, *size)
     rng = np.random.default_rng(0)
     photos = [rng.integers(0, 256, (3 * size[0], 3 * size[1]), dtype=np.uint8) for _ in range(2)]
-    found = registered(DepthMaps(logs, logs), photos, torch.eye(4).expand(2, 4, 4), K.expand(2, 3, 3))
+    found = registered(Rig.of_logs(logs, torch.eye(4).expand(2, 4, 4), K.expand(2, 3, 3), logs), photos)
     assert found.log_depths.shape == logs.shape and found.log_depths.isfinite().all()
 
 
@@ -360,7 +359,7 @@ def test_check_is_asked_before_each_comparison_and_ends_the_work(pair):
     calls = []
     four = Room(pair.photos * 2, pair.logs.repeat(2, 1, 1), pair.viewmats.repeat(2, 1, 1))
     four.registered(four.logs, check=lambda: calls.append(0))
-    assert len(calls) == 4 * sum(min(most, 3) for most in registration._ROUNDS)
+    assert len(calls) == 4 * sum(min(most, 3) for most in REGISTRATION.rounds)
 
     def check() -> None:
         calls.append(0)
@@ -383,11 +382,13 @@ def test_guided_depth_registers_photos_of_known_pose_and_leaves_planes(pair):
     logs, viewmats, Ks = pair.logs[order], pair.viewmats[order], K.expand(3, 3, 3)
     photos = torch.from_numpy(np.stack([pair.photos[v] for v in order]))
     views = Views(photos[:, None].expand(-1, 3, -1, -1) / 255, Ks, ("a", "b", "c"))
-    placed = Poses(viewmats.double().numpy(), np.ones(3), (), (2,))
-    maps = DepthMaps(logs + 0.01 * ripples, torch.full_like(logs, -2.5))
+    errors = torch.full_like(logs, -2.5)
     small = F.interpolate(views.images, size=(HEIGHT, WIDTH), mode="area")
-    found = _agreed(maps, small, views, placed, viewmats, Ks, Run({}))
-    assert torch.equal(found.log_depths[2], maps.log_depths[2]) and found.log_errors is maps.log_errors
+    rig = Rig.of_logs(logs + 0.01 * ripples, viewmats, Ks, errors, small)
+    found = one_surface(rig, (2,), views, Run({}))
+    assert (
+        torch.equal(found.log_depths[2], flatten(sharpen(rig)).log_depths[2]) and found.log_errors is errors
+    )
     left = (found.log_depths - logs)[:2]
     assert left.abs().mean() < 0.01 * ripples.abs().mean() / 3
     assert left[:, 10:-10, 15:-15].std() < 0.01 * ripples.std() / 4

@@ -8,16 +8,13 @@ import torch
 from scipy.optimize import least_squares
 from torch import Tensor
 
-from langflash_core.network.stereo import registration
 from langflash_core.network.stereo.registration import (
-    _FLAT,
-    _STIFF,
-    _TEXTURE,
     _Known,
     _Matches,
     _triangulated,
     smooth,
 )
+from langflash_core.rig.settings import REGISTRATION
 from tests.network.test_registration import poses
 
 
@@ -40,7 +37,7 @@ def test_along_a_line_nothing_is_known_and_across_it_all(angle):
     known = _Known.of(stripes(angle))
     inner = (slice(8, -8), slice(8, -8))
     assert along(known, angle)[inner].min() > 0.99
-    assert along(known, angle + math.pi / 2)[inner].max() < 0.01 / _TEXTURE
+    assert along(known, angle + math.pi / 2)[inner].max() < 0.01 / REGISTRATION.texture
     half = along(known, angle + math.pi / 4)[inner]
     assert half.min() > 0.49 and half.max() < 0.51
 
@@ -61,8 +58,8 @@ def test_what_is_known_is_a_function_of_the_tensor():
     gradients = 50 * rng.normal(size=(5, 7, 6, 2)) * rng.uniform(0.01, 1, (5, 7, 1, 2)) ** 2
     tensors = (gradients[..., :, None] * gradients[..., None, :]).mean(-3)
     energies, axes = np.linalg.eigh(tensors)
-    energies = np.maximum(energies - _FLAT, 0)
-    sure = energies / (energies + _TEXTURE)
+    energies = np.maximum(energies - REGISTRATION.flat, 0)
+    sure = energies / (energies + REGISTRATION.texture)
     expected = np.einsum("hwik,hwk,hwjk->hwij", axes, sure, axes)
     known = _Known.of_tensor(*(tensors[..., i, j].astype(np.float32) for i, j in ((0, 0), (0, 1), (1, 1))))
     for own, (i, j) in ((known.xx, (0, 0)), (known.xy, (0, 1)), (known.yy, (1, 1))):
@@ -81,15 +78,15 @@ def test_smooth_is_the_dense_solution(size):
     target = weight * 0.05 * torch.randn(size, generator=g)
     guide = (100 + 4 * torch.randn(size, generator=g)).numpy()
     shown = guide.astype(np.float64).ravel()
-    flat, own = logs.double().flatten().numpy(), 1 / (registration._ALIKE * registration._EXPECTED**2)
+    flat, own = logs.double().flatten().numpy(), 1 / (REGISTRATION.alike * REGISTRATION.expected**2)
     dense = np.diag(weight.double().flatten().numpy() + own)
     for r, c in np.ndindex(height, width):
         for beside in ((r + 1, c), (r, c + 1)):
             if beside[0] < height and beside[1] < width:
                 i, j = r * width + c, beside[0] * width + beside[1]
-                tie = registration._STIFF * math.exp(-(((flat[i] - flat[j]) / registration._JUMP) ** 2))
-                same = math.exp(-(((shown[i] - shown[j]) / registration._EDGE) ** 2))
-                tie *= registration._ACROSS + (1 - registration._ACROSS) * same
+                tie = REGISTRATION.stiff * math.exp(-(((flat[i] - flat[j]) / REGISTRATION.jump) ** 2))
+                same = math.exp(-(((shown[i] - shown[j]) / REGISTRATION.edge) ** 2))
+                tie *= REGISTRATION.across + (1 - REGISTRATION.across) * same
                 dense[[i, j], [i, j]] += tie
                 dense[[i, j], [j, i]] -= tie
     right = target.double().flatten().numpy()
@@ -122,13 +119,13 @@ def test_smooth_is_cut_at_an_edge_of_the_photo():
     weight, off, falls = torch.zeros(8, 10), torch.zeros(8, 10), []
     weight[:, :3] = weight[:, 7:] = 100
     off[:, :3] = 0.05
-    for far, share in ((60, 1.0), (120, registration._ACROSS)):
+    for far, share in ((60, 1.0), (120, REGISTRATION.across)):
         guide = np.full((8, 10), 60, np.float32)
         guide[:, 5:] = far
         found = smooth(off * weight, weight, torch.zeros(8, 10), guide)
         falls.append(found[:, 4] - found[:, 5])
-        tie = share * _STIFF
-        expected = 0.05 / (2 / 300 + 4 / _STIFF + 1 / tie) / tie
+        tie = share * REGISTRATION.stiff
+        expected = 0.05 / (2 / 300 + 4 / REGISTRATION.stiff + 1 / tie) / tie
         assert falls[-1].numpy() == pytest.approx(expected, rel=0.1)  # a row's ends are no single cells
     assert falls[0].max() < 0.003 and falls[1].min() > 0.03
 
@@ -179,7 +176,7 @@ def test_triangulated_is_the_least_squares_of_each_pixel(noise):
             return [q[i] * a[2] - a[i] - inverse[0] * (shift[i] - q[i] * shift[2]) for i in (0, 1)]
 
         best = least_squares(wrong, [0.5], xtol=1e-12, ftol=1e-12, gtol=1e-12).x[0]
-        limit = registration._FARTHEST
+        limit = REGISTRATION.farthest
         expected = (
             np.clip(-math.log(max(best, 1e-6)) - float(logs[r, c]), -limit, limit) if best > 1e-6 else 0
         )

@@ -8,7 +8,8 @@ import torch
 from torch.nn import functional as F
 
 from langflash_core.network.stereo import sharpening
-from langflash_core.network.stereo.sharpening import REACH, sharpened
+from langflash_core.network.stereo.sharpening import sharpened
+from langflash_core.rig.settings import SHARPENING
 
 SIZE = 64
 
@@ -76,7 +77,9 @@ def test_sums_are_those_of_a_pixel_by_itself():
     flat = sharpening._flatness(logs)
     colours = sharpening._colours(images)
     middle = torch.full_like(logs, 0.5)
-    wide = [F.pad(m, (REACH,) * 4, mode="replicate") for m in (logs[:, None], flat[:, None], colours)]
+    wide = [
+        F.pad(m, (SHARPENING.reach,) * 4, mode="replicate") for m in (logs[:, None], flat[:, None], colours)
+    ]
     found = sharpening._parted(wide[0], wide[1], middle, sharpening._places(), colours, wide[2])
     for row, column in ((20, 18), (0, 0), (39, 35), (3, 30)):
         sums = np.zeros((2, 2))

@@ -6,6 +6,7 @@ import pytest
 import torch
 
 from langflash_core.geometry.cameras import invert_rigid, project, transform, unproject
+from langflash_core.rig.rig import Rig
 from langflash_core.scene.consistency import TOLERANCE, outvoted, seen_through
 
 K = torch.tensor([[30.0, 0, 16], [0, 30.0, 12], [0, 0, 1]])
@@ -16,11 +17,8 @@ def _two_views(depths_0: float, depths_1: float, confidence_0: float = 0.5, conf
     viewmats = torch.eye(4).repeat(2, 1, 1)
     viewmats[1, 0, 3] = -0.2
     depths = torch.stack((torch.full((24, 32), depths_0), torch.full((24, 32), depths_1)))
-    points = unproject(depths, K.expand(2, 3, 3)).flatten(1, 2)
-    means = torch.cat([transform(invert_rigid(m), p) for m, p in zip(viewmats, points, strict=True)])
     confidences = torch.stack((torch.full((24, 32), confidence_0), torch.full((24, 32), confidence_1)))
-    blocked = seen_through(means, viewmats, K.expand(2, 3, 3), depths, confidences)
-    return blocked.view(2, 24, 32)
+    return seen_through(Rig(viewmats, K.expand(2, 3, 3), depths, confidences))
 
 
 def test_agreeing_views_keep_everything():
@@ -45,30 +43,26 @@ def test_a_conflict_never_takes_both():
     torch.manual_seed(0)
     viewmats = torch.eye(4).repeat(2, 1, 1)
     depths = torch.rand(2, 24, 32) * 3 + 0.5
-    points = unproject(depths, K.expand(2, 3, 3)).flatten(0, 2)
     confidences = torch.randint(0, 3, (2, 24, 32)) / 2
-    blocked = seen_through(points, viewmats, K.expand(2, 3, 3), depths, confidences).view(2, 24, 32)
+    blocked = seen_through(Rig(viewmats, K.expand(2, 3, 3), depths, confidences))
     assert blocked.any()
     assert not (blocked[0] & blocked[1]).any()  # the same cameras: rivals share a pixel
 
 
 def test_one_view_and_points_behind_are_left_alone():
     depths = torch.full((1, 24, 32), 2.0)
-    means = unproject(depths, K[None]).flatten(0, 2)
-    assert not seen_through(means, torch.eye(4)[None], K[None], depths, torch.ones(1, 24, 32)).any()
+    assert not seen_through(Rig(torch.eye(4)[None], K[None], depths, torch.ones(1, 24, 32))).any()
     turned = torch.eye(4).repeat(2, 1, 1)
     turned[1, :3, :3] = torch.diag(torch.tensor([-1.0, 1.0, -1.0]))
     both = torch.full((2, 24, 32), 2.0)
-    points = unproject(both, K.expand(2, 3, 3)).flatten(1, 2)
-    world = torch.cat([transform(invert_rigid(m), p) for m, p in zip(turned, points, strict=True)])
-    assert not seen_through(world, turned, K.expand(2, 3, 3), both, torch.ones(2, 24, 32)).any()
+    assert not seen_through(Rig(turned, K.expand(2, 3, 3), both, torch.ones(2, 24, 32))).any()
 
 
 def test_numbers_that_are_not_finite_do_not_raise():
     depths = torch.full((2, 24, 32), 2.0)
-    means = torch.full((2 * 24 * 32, 3), float("nan"))
+    depths[1] = torch.nan
     viewmats = torch.eye(4).repeat(2, 1, 1)
-    assert not seen_through(means, viewmats, K.expand(2, 3, 3), depths, torch.ones(2, 24, 32)).any()
+    assert not seen_through(Rig(viewmats, K.expand(2, 3, 3), depths, torch.ones(2, 24, 32))).any()
 
 
 def test_several_views_equal_their_twin():
@@ -92,17 +86,15 @@ def test_several_views_equal_their_twin():
             theirs, own = confidences[other, int(y), int(x)], confidences[view].flatten()[i]
             outvoted = theirs > own or (theirs == own and other < view)
             expected[view, i] |= bool(z < (1 - TOLERANCE) * depths[other, int(y), int(x)] and outvoted)
-    blocked = seen_through(torch.cat(means), viewmats, Ks, depths, confidences)
-    assert expected.any() and torch.equal(blocked, expected.flatten())
+    blocked = seen_through(Rig(viewmats, Ks, depths, confidences))
+    assert expected.any() and torch.equal(blocked.flatten(1), expected)
 
 
 def _three_views(depths: torch.Tensor) -> torch.Tensor:
     """`outvoted` of three cameras side by side with these depths (3, 24, 32)."""
     viewmats = torch.eye(4).repeat(3, 1, 1)
     viewmats[1, 0, 3], viewmats[2, 0, 3] = -0.2, 0.2
-    points = unproject(depths, K.expand(3, 3, 3)).flatten(1, 2)
-    world = torch.stack([transform(invert_rigid(m), p) for m, p in zip(viewmats, points, strict=True)])
-    return outvoted(world, viewmats, K.expand(3, 3, 3), depths)
+    return outvoted(Rig(viewmats, K.expand(3, 3, 3), depths))
 
 
 def test_a_skirt_that_two_others_see_through_goes():
@@ -132,5 +124,4 @@ def test_far_from_jumps_nothing_is_outvoted():
 def test_two_photos_cannot_outvote():
     depths = torch.full((2, 24, 32), 2.0)
     depths[0, :, 15:17] = 1.5
-    points = unproject(depths, K.expand(2, 3, 3)).flatten(1, 2)
-    assert not outvoted(points, torch.eye(4).repeat(2, 1, 1), K.expand(2, 3, 3), depths).any()
+    assert not outvoted(Rig(torch.eye(4).repeat(2, 1, 1), K.expand(2, 3, 3), depths)).any()

@@ -16,6 +16,7 @@ from langflash_core.geometry.cameras import (
     world_points,
 )
 from langflash_core.geometry.rotations import matrix
+from langflash_core.rig.rig import Rig
 from langflash_core.scene.doubts import ALONE, TORN
 from langflash_core.splat.foreseen import CELL, Foresight, _pointed, foresight
 from langflash_core.types import Camera
@@ -31,7 +32,7 @@ class Seen:
     Ks: Tensor
 
     def found(self) -> Foresight:
-        return foresight(self.images, self.depths, self.viewmats, self.Ks)
+        return foresight(Rig(self.viewmats, self.Ks, self.depths, photos=self.images))
 
     def turned(self, view: int, degrees: float) -> "Seen":
         """With one photo's pose turned about its own upright axis."""

@@ -18,10 +18,10 @@ if TYPE_CHECKING:
     from langflash_core.language.relevance import CompiledQuery
 
 
-def lapsed(state: State) -> State:
+def revise(state: State) -> State:
     """The state without scores: the Gaussians, the atoms or the negatives that they rest on are others."""
     prompts = tuple(replace(p, score=None) for p in state.asking.prompts)
-    return state.with_asking(prompts=prompts).with_asking(histograms=(), lapses=state.asking.lapses + 1)
+    return state.with_asking(prompts=prompts).with_asking(histograms=(), revision=state.asking.revision + 1)
 
 
 # Phrases
@@ -166,7 +166,7 @@ class SetNegatives:
     negatives: tuple[str, ...]
 
     def apply(self, state: State) -> State:
-        return lapsed(state.with_asking(negatives=self.negatives))
+        return revise(state.with_asking(negatives=self.negatives))
 
 
 @dataclass(frozen=True)
@@ -262,15 +262,15 @@ class PromptsRead:
 class Answered:
     """Scores in the view on show: (key, text, score); a prompt edited meanwhile keeps none.
 
-    lapses: as `Asking.lapses` was; scores that have lapsed since are dropped. places: where each fits best.
+    revision: as `Asking.revision` was; scores of an earlier one are dropped. places: where each fits best.
     """
 
     scores: tuple[tuple[int, str, float], ...]
-    lapses: int = 0
+    revision: int = 0
     places: tuple[Vector | None, ...] = ()
 
     def apply(self, state: State) -> State:
-        if self.lapses != state.asking.lapses:
+        if self.revision != state.asking.revision:
             return state
         current = {p.key: p.text.strip() for p in state.asking.prompts}
         for (key, text, score), place in zip_longest(self.scores, self.places):
@@ -282,15 +282,15 @@ class Answered:
 @dataclass(frozen=True)
 class Narrowed:
     """Relevance (P, H, W) of the view so named, of what the phrases mean alone. notes: (key, text, note)
-    of the phrases that choose. lapses: as of `Answered`."""
+    of the phrases that choose. revision: as of `Answered`."""
 
     name: tuple = field(repr=False)
     relevance: "Tensor" = field(compare=False, repr=False)
     notes: tuple[tuple[int, str, str], ...] = ()
-    lapses: int = 0
+    revision: int = 0
 
     def apply(self, state: State) -> State:
-        if self.lapses != state.asking.lapses:
+        if self.revision != state.asking.revision:
             return state
         current = {p.key: p.text.strip() for p in state.asking.prompts}
         for key, text, note in self.notes:
@@ -325,14 +325,14 @@ class Calibrated:
 
 @dataclass(frozen=True)
 class PhrasesCompiled:
-    """The phrases `keys`, in the order of `query`, are ready to be asked. lapses: as `Asking.lapses` was.
+    """The phrases `keys`, in the order of `query`, are ready to be asked. revision: as `Asking.revision` was.
     notes: on each, or "" (`langflash_core/language/hints.py`). readings: of each, "" where it is asked as it
     stands (`langflash_core/language/grammar.py`).
     """
 
     keys: tuple[int, ...]
     query: "CompiledQuery" = field(compare=False, repr=False)
-    lapses: int = 0
+    revision: int = 0
     notes: tuple[str, ...] = ()
     readings: tuple[str, ...] = ()
 
@@ -346,13 +346,13 @@ class PhrasesCompiled:
 
 @dataclass(frozen=True)
 class Binned:
-    """How the pixels of the view on show score. lapses: as for `Answered`."""
+    """How the pixels of the view on show score. revision: as for `Answered`."""
 
     histograms: tuple[Histogram, ...]
-    lapses: int = 0
+    revision: int = 0
 
     def apply(self, state: State) -> State:
-        if self.lapses != state.asking.lapses:
+        if self.revision != state.asking.revision:
             return state
         return state.with_asking(histograms=self.histograms)
 

@@ -47,8 +47,8 @@ class AskingEffects(Effects):
             return
         keys, texts = tuple(p.key for p in asked), tuple(p.text.strip() for p in asked)
         likes, marks = tuple(p.like for p in asked), state.editing.marks
-        scene, lapses = (info.serial, info.scene), state.asking.lapses
-        self._hands.submit(Encode(*scene, keys, texts, state.asking.negatives, likes, marks, lapses))
+        scene, revision = (info.serial, info.scene), state.asking.revision
+        self._hands.submit(Encode(*scene, keys, texts, state.asking.negatives, likes, marks, revision))
 
     def _take_apart(self, state: State) -> None:
         info, marks, prompt = state.scene.info, state.editing.marks, divided(state)
@@ -68,8 +68,8 @@ class AskingEffects(Effects):
                 submit(WritePrompts(PromptSet(state.asking.prompts, state.asking.negatives), path))
             case LoadPrompts(path):
                 submit(ReadPrompts(path))
-            case PhrasesCompiled(keys, query, lapses):
-                self._viewport.ask(keys, query, lapses)
+            case PhrasesCompiled(keys, query, revision):
+                self._viewport.ask(keys, query, revision)
             case Narrowed(name, relevance):
                 self._viewport.narrow(name, relevance)
             case TakePartOut(text, part) if state.scene.job is not None and own_atom(before, part) is None:
@@ -136,7 +136,7 @@ class AskingEffects(Effects):
         if view is not None:
             seen = (view.relevance, view.frame, view.camera, view.query)
             chosen = (view.others, view.up, view.cuts, view.name)
-            self._hands.submit(Answer(view.serial, view.keys, *seen, view.lapses, *chosen))
+            self._hands.submit(Answer(view.serial, view.keys, *seen, view.revision, *chosen))
 
 
 def _answer(state: State) -> tuple | None:
@@ -151,4 +151,4 @@ def _answer(state: State) -> tuple | None:
 def _question(state: State) -> tuple:
     """What an encoding depends on."""
     serial = state.scene.info.serial if state.scene.info else 0
-    return serial, tuple((p.key, p.text.strip(), p.like) for p in state.asking.asked), state.asking.lapses
+    return serial, tuple((p.key, p.text.strip(), p.like) for p in state.asking.asked), state.asking.revision

@@ -15,7 +15,7 @@ from ..editing.commands import with_edit
 from ..editing.state import Point
 from ..scene.state import Job
 from ..state import State
-from .commands import lapsed
+from .commands import revise
 from .state import Part, Parts, Prompt, plain
 
 TAKING_OUT = "Removing a part"
@@ -62,7 +62,7 @@ class TakePartBack:
         if marks is None or self.atom >= len(marks.atoms):
             return state
         after = with_edit(state, f"Put a part back into {self.text}", allow_atom(marks, self.atom, self.text))
-        return lapsed(after)
+        return revise(after)
 
 
 @dataclass(frozen=True)
@@ -88,7 +88,7 @@ def denied(state: State, k: int, text: str) -> State:
     """The state in which an atom is not what the text means."""
     marks = state.editing.marks
     assert marks is not None
-    return lapsed(with_edit(state, f"Remove a part of {text}", deny_atom(marks, k, text)))
+    return revise(with_edit(state, f"Remove a part of {text}", deny_atom(marks, k, text)))
 
 
 def own_atom(state: State, part: Part) -> int | None:

@@ -138,7 +138,7 @@ class Asking:
     active: key of the prompt in hand. negatives: the person's own; none: those of the scene. recent: phrases
     asked, the newest first. atom: whose weight map is on show. chosen: atoms to merge. prompts_path: where
     the last set was. usual: what the scene compares phrases with, by its own calibration, once it has said
-    so. lapses: how often what scores rest on has changed. caret: the prompt whose field takes the keys next.
+    so. revision: of what scores rest on. caret: the prompt whose field takes the keys next.
     span: relevance of the first and the last colour of a heat-map, the person's own; None: by the threshold.
     named: names of things stand in the picture. parts: of the answer to the active phrase.
     """
@@ -153,7 +153,7 @@ class Asking:
     chosen: tuple[int, ...] = ()
     prompts_path: Path | None = None
     usual: tuple[str, ...] = ()
-    lapses: int = 0
+    revision: int = 0
     caret: int | None = None
     span: tuple[float, float] | None = None
     named: bool = False

@@ -14,7 +14,7 @@ from langflash_core.scene.edits import Marks
 from langflash_core.scene.mask import Mask
 
 from ..commands import Command, Notify, ShowPicture
-from ..requests import Asked, Errand, SceneErrand
+from ..requests import Asked, SceneTask, Task
 from ..scene.memory import SceneMemory
 from .commands import Answered, AtomsDescribed, AtomsWeighed, Binned, Narrowed, PhrasesCompiled, PromptsRead
 from .parting import PartsListed
@@ -29,11 +29,11 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class Encode(SceneErrand):
+class Encode(SceneTask):
     """Compile phrases against a scene; milliseconds once the text tower is loaded.
 
     likes: per phrase a language vector as float32 bytes, asked instead of the text, or none.
-    lapses: as `Asking.lapses` is.
+    revision: as `Asking.revision` is.
     """
 
     newest_counts = True
@@ -44,7 +44,7 @@ class Encode(SceneErrand):
     negatives: tuple[str, ...]
     likes: tuple[bytes, ...] = ()
     marks: Marks | None = None
-    lapses: int = 0
+    revision: int = 0
 
     def run(self, stopping: Asked) -> Iterator[Command]:
         from langflash_core.language.grammar import whole
@@ -68,7 +68,7 @@ class Encode(SceneErrand):
         noted = zip(query.notes, self.likes or repeat(b""), strict=False)
         notes = tuple("" if like else note for note, like in noted)
         readings = tuple("" if reading.whole else str(reading) for reading in query.readings)
-        yield PhrasesCompiled(self.keys, query, self.lapses, notes, readings)
+        yield PhrasesCompiled(self.keys, query, self.revision, notes, readings)
 
 
 def _vector(content: bytes) -> "Tensor":
@@ -78,7 +78,7 @@ def _vector(content: bytes) -> "Tensor":
 
 
 @dataclass(frozen=True)
-class Answer(SceneErrand):
+class Answer(SceneTask):
     """Score phrases in one view, of what they mean alone, and count how its pixels score.
 
     others, up, cuts, name: as `View` of app/window/drawing/values.py.
@@ -91,7 +91,7 @@ class Answer(SceneErrand):
     frame: "Frame"
     camera: "Camera"
     query: "CompiledQuery"
-    lapses: int = 0
+    revision: int = 0
     others: "Tensor | None" = None
     up: tuple[float, ...] = (0.0, -1.0, 0.0)
     cuts: tuple[float, ...] = ()
@@ -105,13 +105,13 @@ class Answer(SceneErrand):
             relevance, query = self._narrowed()
             choosing = zip(self.keys, query.texts, query.notes, query.readings, strict=True)
             notes = tuple((key, text, note) for key, text, note, reading in choosing if reading.narrows)
-            yield Narrowed(self.name, relevance, notes, self.lapses)
+            yield Narrowed(self.name, relevance, notes, self.revision)
         result = answer(relevance, self.frame, self.camera, query)
         answers = zip(self.keys, result.answers, strict=True)
         scores = tuple((key, a.prompt, float(a.score)) for key, a in answers)
         places = best_places(relevance, self.frame, self.camera)
-        yield Answered(scores, self.lapses, tuple(p and Vector(*p) for p in places))
-        yield Binned(self.histograms(relevance), self.lapses)
+        yield Answered(scores, self.revision, tuple(p and Vector(*p) for p in places))
+        yield Binned(self.histograms(relevance), self.revision)
 
     def _narrowed(self) -> "tuple[Tensor, CompiledQuery]":
         from langflash_core.language.narrowing import narrow_view
@@ -133,7 +133,7 @@ class Answer(SceneErrand):
 
 
 @dataclass(frozen=True)
-class ListParts(SceneErrand):
+class ListParts(SceneTask):
     """Take the answer to a phrase apart: what is connected and looks like one kind of thing is a part. What
     is too small to be one belongs to the nearest."""
 
@@ -214,7 +214,7 @@ def _part(
 
 
 @dataclass(frozen=True)
-class WritePrompts(Errand):
+class WritePrompts(Task):
     """Write a prompt set."""
 
     saves = True
@@ -228,7 +228,7 @@ class WritePrompts(Errand):
 
 
 @dataclass(frozen=True)
-class ReadPrompts(Errand):
+class ReadPrompts(Task):
     """Read a prompt set."""
 
     path: Path
@@ -238,7 +238,7 @@ class ReadPrompts(Errand):
 
 
 @dataclass(frozen=True)
-class DescribeAtoms(SceneErrand):
+class DescribeAtoms(SceneTask):
     """Look the atoms over: shares, colours, cosines, and a small picture of each that a photo shows."""
 
     scene: "Scene" = field(repr=False)
@@ -266,7 +266,7 @@ class DescribeAtoms(SceneErrand):
 
 
 @dataclass(frozen=True)
-class WeighAtoms(SceneErrand):
+class WeighAtoms(SceneTask):
     """How much of what is left of the scene each atom carries."""
 
     newest_counts = True

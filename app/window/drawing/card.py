@@ -29,8 +29,8 @@ class CardPicture:
         self.governor = Governor(len(scene.gaussians), slow=False, coarse=coarse_share(scene))
         self.easel = Easel(renderer, serial, scene, self.governor.share)
 
-    def ask(self, keys: tuple[int, ...], query: "CompiledQuery | None", lapses: int) -> None:
-        self.easel.ask(keys, query, lapses)
+    def ask(self, keys: tuple[int, ...], query: "CompiledQuery | None", revision: int) -> None:
+        self.easel.ask(keys, query, revision)
 
     def mark(self, marked: Marked) -> None:
         self.easel.mark(marked)

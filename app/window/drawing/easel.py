@@ -77,9 +77,9 @@ class Easel:
 
     # --- what to show -----------------------------------------------------------------------
 
-    def ask(self, keys: tuple[int, ...], query: "CompiledQuery | None", lapses: int) -> None:
+    def ask(self, keys: tuple[int, ...], query: "CompiledQuery | None", revision: int) -> None:
         """Ask other phrases, as `Asked` has them."""
-        self.asked = Asked(keys, query, lapses, self.asked.number + 1)
+        self.asked = Asked(keys, query, revision, self.asked.number + 1)
         self._painted = self._scored = None
         self.renderer.ask(query)
 
@@ -211,7 +211,7 @@ class Easel:
             return None
         if drawn.plan.kind is not Kind.MAPS or state.now - stand.moved < SETTLE_AFTER:
             return None
-        if asked.lapses != state.asking.lapses:
+        if asked.revision != state.asking.revision:
             return None  # the query that holds now is on its way
         if drawn != self.wanted(state, stand, drawn.plan):
             return None  # and so is the picture
@@ -229,7 +229,7 @@ class Easel:
             found.relevance,
             camera,
             asked.query,
-            asked.lapses,
+            asked.revision,
             found.others,
             self._up,
             name,

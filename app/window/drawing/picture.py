@@ -19,7 +19,7 @@ class ScenePicture(Protocol):
     governor: Governor
     easel: "Easel"
 
-    def ask(self, keys: tuple[int, ...], query: "CompiledQuery | None", lapses: int) -> None:
+    def ask(self, keys: tuple[int, ...], query: "CompiledQuery | None", revision: int) -> None:
         """Ask other phrases, as `Asked` has them."""
         ...
 

@@ -53,8 +53,8 @@ class ProcessorPicture:
         self._unpainted = False  # a picture was drawn that the next frame paints
         self._carried = True  # whether Gaussians have their numbers for the query
 
-    def ask(self, keys: tuple[int, ...], query: "CompiledQuery | None", lapses: int) -> None:
-        self.easel.ask(keys, query, lapses)
+    def ask(self, keys: tuple[int, ...], query: "CompiledQuery | None", revision: int) -> None:
+        self.easel.ask(keys, query, revision)
         self._carried = query is None
 
     def mark(self, marked: Marked) -> None:

@@ -49,18 +49,18 @@ class Drawn:
 
 @dataclass(frozen=True)
 class Asked:
-    """The prompts `keys`, in the order of `query`, compiled when `Asking.lapses` was `lapses`; none without a
+    """The prompts `keys`, in the order of `query`, compiled at this `Asking.revision`; none without a
     query. number: names the question."""
 
     keys: tuple[int, ...] = ()
     query: "CompiledQuery | None" = None
-    lapses: int = 0
+    revision: int = 0
     number: int = 0
 
 
 @dataclass(frozen=True)
 class View:
-    """A picture at rest, read back for the worker to score. lapses: as `Asking.lapses` is. others: relevance
+    """A picture at rest, read back for the worker to score. revision: as `Asking` has it. others: relevance
     (R, H, W) of what the phrases relate their heads to. up: of the scene, a unit vector. name: of the picture
     and the question; cuts: thresholds in force.
     """
@@ -71,7 +71,7 @@ class View:
     relevance: "Tensor"
     camera: "Camera"
     query: "CompiledQuery"
-    lapses: int
+    revision: int
     others: "Tensor | None" = None
     up: tuple[float, ...] = (0.0, -1.0, 0.0)
     name: tuple = ()

@@ -9,7 +9,7 @@ from langflash_core.errors import InputError
 from langflash_core.mending.recipes import COLOUR, MEASURES, Recipe, Rule, load_recipe, save_recipe
 
 from ..commands import Command, Notify
-from ..requests import Asked, Errand
+from ..requests import Asked, Task
 from ..state import State
 from .commands import FindFloaters
 
@@ -133,7 +133,7 @@ class RecipeRead:
 
 
 @dataclass(frozen=True)
-class WriteRecipe(Errand):
+class WriteRecipe(Task):
     """Write a recipe, as `langflash clean --save-recipe` does."""
 
     saves = True
@@ -147,7 +147,7 @@ class WriteRecipe(Errand):
 
 
 @dataclass(frozen=True)
-class ReadRecipe(Errand):
+class ReadRecipe(Task):
     """Read a recipe."""
 
     path: Path

@@ -9,7 +9,7 @@ from langflash_core.scene.changes import Moved
 from langflash_core.scene.edits import Combine, History, Marks
 from langflash_core.scene.mask import Mask
 
-from ..asking.commands import lapsed
+from ..asking.commands import revise
 from ..commands import Notify
 from ..state import State
 from .state import Floaters, Point, Region
@@ -379,7 +379,7 @@ def _with_history(state: State, history: History) -> State:
     """Another history; scores hold on only while it shows the same Gaussians with the same atoms."""
     before = state.editing.marks
     state = state.with_editing(history=history, gesture=None, tint=None)
-    return state if _spoken_of(before) == _spoken_of(history.marks) else lapsed(state)
+    return state if _spoken_of(before) == _spoken_of(history.marks) else revise(state)
 
 
 def _spoken_of(marks: Marks | None) -> tuple | None:

@@ -18,7 +18,7 @@ from langflash_core.scene.edits import Combine, Marks
 from langflash_core.scene.mask import Mask
 
 from ..commands import Command, Notify
-from ..requests import Asked, SceneErrand
+from ..requests import Asked, SceneTask
 from ..scene.memory import SceneMemory
 from ..scene.state import SceneInfo
 from ..state import State
@@ -50,7 +50,7 @@ WORDS_ASKED, WORDS_OF_ATOM = 6, 3
 
 
 @dataclass(frozen=True)
-class EditErrand(SceneErrand):
+class EditTask(SceneTask):
     """About a scene as its marks show it."""
 
     memory: SceneMemory = field(repr=False)
@@ -82,7 +82,7 @@ class EditErrand(SceneErrand):
 
 
 @dataclass(frozen=True)
-class Selection(EditErrand):
+class Selection(EditTask):
     """Something looks for Gaussians and waits for it."""
 
     def failed(self, sentence: str) -> Iterable[Command]:
@@ -147,7 +147,7 @@ class FindThing(AtPixel):
 
 
 @dataclass(frozen=True)
-class PrepareThings(EditErrand):
+class PrepareThings(EditTask):
     """What clicks can mean, before the first one: it takes seconds."""
 
     newest_counts = True
@@ -165,7 +165,7 @@ def regions_in(memory: SceneMemory) -> "Regions":
 
 
 @dataclass(frozen=True)
-class DrawOutline(EditErrand):
+class DrawOutline(EditTask):
     """The line around what the picture's place, which has `size`, shows of the selection."""
 
     newest_counts = True
@@ -284,7 +284,7 @@ class GrowSelection(Selection):
 
 
 @dataclass(frozen=True)
-class ScoreFloaters(EditErrand):
+class ScoreFloaters(EditTask):
     """The strength of cleaning from which every Gaussian goes, and what else a recipe finds. Where it cannot
     be followed, nothing goes."""
 
@@ -331,7 +331,7 @@ class ScoreFloaters(EditErrand):
 
 
 @dataclass(frozen=True)
-class FindMargins(EditErrand):
+class FindMargins(EditTask):
     """The margin from which on every Gaussian is hidden with the selection."""
 
     newest_counts = True
@@ -399,7 +399,7 @@ def _phrase(state: State, info: SceneInfo, marks: Marks, key: int, combine: Comb
 
 
 @dataclass(frozen=True)
-class Weigh(EditErrand):
+class Weigh(EditTask):
     """The groups of a pixel whose weight maps are not drawn. size: of the picture's place."""
 
     newest_counts = True
@@ -470,7 +470,7 @@ class NamePlace(Weigh):
 
 
 @dataclass(frozen=True)
-class NameAtoms(EditErrand):
+class NameAtoms(EditTask):
     """The nearest household words of every atom."""
 
     def run(self, stopping: Asked) -> Iterator[Command]:
@@ -482,7 +482,7 @@ class NameAtoms(EditErrand):
 
 
 @dataclass(frozen=True)
-class KeepLessons(EditErrand):
+class KeepLessons(EditTask):
     """Add what was taught in the scene to the person's own vocabulary."""
 
     path: Path
@@ -503,7 +503,7 @@ class KeepLessons(EditErrand):
 
 
 @dataclass(frozen=True)
-class FindLessons(EditErrand):
+class FindLessons(EditTask):
     """Which groups look like what was taught in other scenes."""
 
     path: Path

@@ -8,14 +8,14 @@ import numpy as np
 from langflash_core.geometry.poses import Pose, alike, from_view, to_camera
 
 from ..commands import Command
-from ..requests import Asked, Errand
+from ..requests import Asked, Task
 from .commands import TourReady
 
 _SIDE = 900  # pixels of the cameras that are computed with
 
 
 @dataclass(frozen=True)
-class PlanTour(Errand):
+class PlanTour(Task):
     """The same splines that `langflash export --path` follows."""
 
     keys: tuple[Pose, ...]

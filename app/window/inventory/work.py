@@ -14,7 +14,7 @@ from langflash_core.scene.edits import Marks
 from langflash_core.scene.mask import Mask
 
 from ..commands import Command, ShowPicture
-from ..requests import Asked, SceneErrand
+from ..requests import Asked, SceneTask
 from ..scene.memory import SceneMemory
 from .commands import Listed, NotListed
 from .state import Row
@@ -28,7 +28,7 @@ _AROUND = 0.06  # of a thing's longer side, that its picture shows around it
 
 
 @dataclass(frozen=True)
-class TakeInventory(SceneErrand):
+class TakeInventory(SceneTask):
     """List the things of the scene as edited."""
 
     newest_counts = True

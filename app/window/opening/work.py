@@ -16,7 +16,7 @@ from langflash_core.files import make_folder, write_atomically
 
 from ...places import state_folder
 from ..commands import Command, ShowPicture
-from ..requests import Asked, Errand, Job
+from ..requests import Asked, Job, Task
 from ..scene.commands import OpenPaths
 from ..scene.drops import in_folder, sayable
 from ..scene.samples import pairs
@@ -47,7 +47,7 @@ class LookThrough(Job):
 
 
 @dataclass(frozen=True)
-class ReadFolder(Errand):
+class ReadFolder(Task):
     """List a folder."""
 
     path: Path
@@ -60,8 +60,8 @@ class ReadFolder(Errand):
 
 
 @dataclass(frozen=True)
-class SmallPictures(Errand):
-    """Some of a folder's photos as small pictures, the rest as an errand of its own, so that others come in
+class SmallPictures(Task):
+    """Some of a folder's photos as small pictures, the rest as a task of its own, so that others come in
     between; those that cannot be read are left out."""
 
     folder: Path
@@ -78,7 +78,7 @@ class SmallPictures(Errand):
 
 
 @dataclass(frozen=True)
-class SampleTiles(Errand):
+class SampleTiles(Task):
     """The first photo of each pair that comes with the program."""
 
     light = True
@@ -90,7 +90,7 @@ class SampleTiles(Errand):
 
 
 @dataclass(frozen=True)
-class PastePicture(Errand):
+class PastePicture(Task):
     """Take a picture, or files, from the clipboard."""
 
     def run(self, stopping: Asked) -> Iterator[Command]:

@@ -15,7 +15,7 @@ from langflash_core.scene.edits import History
 
 from ..commands import Command, Log, Notify
 from ..effects import Effects, Hands
-from ..requests import Errand
+from ..requests import Task
 from ..scene.commands import OpenScene, Reconstruct, SceneArrived, SceneSaved
 from ..scene.drops import SCENE_SUFFIX
 from ..scene.state import SceneInfo
@@ -59,7 +59,7 @@ class RecoveryEffects(Effects):
         self._copied = False  # whether the copy of an unsaved scene is complete
         self._edits_kept = False  # whether edits of the scene on show lie on the disk
         self._edits_wrote = False  # or have ever, and what removes them may not have come to it
-        self._replaced: list[Errand] = []  # forget what goes once the same edits are written elsewhere
+        self._replaced: list[Task] = []  # forget what goes once the same edits are written elsewhere
         self._snapshot: tuple = ()
         self._saved: Preferences | None = None  # the preferences that this window found, or wrote last
         self._keep_at = self._keep_edits_at = self._save_at = NEVER
@@ -138,8 +138,8 @@ class RecoveryEffects(Effects):
                 self._snapshot = ()  # the session now has a scene to name
                 self._drop_outlived(state)
             case EditsKept(file) if file is not None and self._outlived is None:
-                for errand in self._replaced:
-                    self._hands.submit(errand)
+                for task in self._replaced:
+                    self._hands.submit(task)
                 self._replaced = []
             case EndSessionOffer(restore) if before.recovery.session is not None:
                 self._end_session_offer(before.recovery.session, restore)
@@ -195,11 +195,11 @@ class RecoveryEffects(Effects):
         else:
             self._hands.submit(LookForEdits(info.serial, info.scene, info.path))
         if replaces and before.scene.info is not None:
-            errand = ForgetEdits(before.scene.info.scene, self._keeper.token)
+            task = ForgetEdits(before.scene.info.scene, self._keeper.token)
             if info.history is not None and info.history.done:  # the same edits are to lie beside this scene
-                self._replaced.append(errand)
+                self._replaced.append(task)
             else:  # something was hidden for good: nothing is kept that shows it
-                self._hands.submit(errand)
+                self._hands.submit(task)
 
     def _end_offer(self, offer: Offer, restore: bool, forget: bool) -> None:
         if restore:
@@ -284,7 +284,7 @@ class RecoveryEffects(Effects):
         else:
             self._saved = wanted
 
-    def _keep(self, kept: Kept, outlived: Path | None = None, replaced: Iterable[Errand] = ()) -> None:
+    def _keep(self, kept: Kept, outlived: Path | None = None, replaced: Iterable[Task] = ()) -> None:
         try:
             self._keeper.keep(kept)
         except LangFlashError as error:
@@ -292,8 +292,8 @@ class RecoveryEffects(Effects):
             return
         if outlived is not None:
             sessions.forget(outlived)
-        for errand in replaced:
-            list(errand.run(lambda: False))
+        for task in replaced:
+            list(task.run(lambda: False))
 
     def _kept(self, state: State) -> Kept:
         info = state.scene.info

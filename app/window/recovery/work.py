@@ -13,7 +13,7 @@ from langflash_core.files import make_folder
 from langflash_core.scene.edits import History, Marks
 
 from ..commands import Command
-from ..requests import Asked, Errand, SceneErrand
+from ..requests import Asked, SceneTask, Task
 from . import edits, projects, sessions
 from .commands import CopyKept, EditsKept, OfferEdits, ProjectsRead
 from .state import KeptPhoto
@@ -23,7 +23,7 @@ if TYPE_CHECKING:
 
 
 @dataclass(frozen=True)
-class KeepCopy(SceneErrand):
+class KeepCopy(SceneTask):
     """Write a scene that nobody saved where a crash cannot take it; with `marks` as they edit it."""
 
     scene: "Scene" = field(repr=False)
@@ -40,7 +40,7 @@ class KeepCopy(SceneErrand):
 
 
 @dataclass(frozen=True)
-class KeepEdits(SceneErrand):
+class KeepEdits(SceneTask):
     """Write the edits where a crash cannot take them; `token` names the session."""
 
     scene: "Scene" = field(repr=False)
@@ -56,7 +56,7 @@ class KeepEdits(SceneErrand):
 
 
 @dataclass(frozen=True)
-class ForgetEdits(Errand):
+class ForgetEdits(Task):
     """Remove what a session kept of a scene."""
 
     scene: "Scene" = field(repr=False)
@@ -68,7 +68,7 @@ class ForgetEdits(Errand):
 
 
 @dataclass(frozen=True)
-class ForgetScene(Errand):
+class ForgetScene(Task):
     """Remove all that any session kept of a scene, by its content or its paths; of this session its `copies`,
     and of those that ended badly what they exported."""
 
@@ -86,7 +86,7 @@ class ForgetScene(Errand):
 
 
 @dataclass(frozen=True)
-class ForgetFile(Errand):
+class ForgetFile(Task):
     """Remove a file of kept edits."""
 
     edits: Path
@@ -97,7 +97,7 @@ class ForgetFile(Errand):
 
 
 @dataclass(frozen=True)
-class LookForEdits(SceneErrand):
+class LookForEdits(SceneTask):
     """Edits that an earlier session kept: of a scene, or the newest of all."""
 
     scene: "Scene | None" = field(default=None, repr=False)
@@ -110,7 +110,7 @@ class LookForEdits(SceneErrand):
 
 
 @dataclass(frozen=True)
-class ReadProjects(Errand):
+class ReadProjects(Task):
     """What is remembered of recent scenes; nothing of those that have gone."""
 
     recent: tuple[str, ...]

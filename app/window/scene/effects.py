@@ -76,7 +76,7 @@ class SceneEffects(Effects):
         self._networks = Networks()
 
     def follow(self, command: Command, before: State, state: State) -> None:
-        """Jobs and errands of the worker; a scene that has come goes to the renderer."""
+        """Jobs and tasks of the worker; a scene that has come goes to the renderer."""
         submit = self._hands.submit
         match command:
             case OpenPaths(paths, was_dropped):

@@ -23,7 +23,7 @@ from langflash_core.scene.doubts import doubtful, told_warnings
 from langflash_core.scene.edits import History, Marks
 
 from ..commands import Command, ShowPicture
-from ..requests import Asked, Errand, Job, SceneErrand
+from ..requests import Asked, Job, SceneTask, Task
 from . import unfinished
 from .commands import (
     ChoosingFailed,
@@ -191,11 +191,11 @@ def _extent(means: np.ndarray) -> tuple[Vector, Vector] | None:
     return Vector(*low.tolist()), Vector(*high.tolist())
 
 
-# Errands
+# Tasks
 
 
 @dataclass(frozen=True)
-class WriteScene(Errand):
+class WriteScene(Task):
     """Write a scene file of the scene as edited."""
 
     saves = True
@@ -214,7 +214,7 @@ class WriteScene(Errand):
 
 
 @dataclass(frozen=True)
-class FindWorld(SceneErrand):
+class FindWorld(SceneTask):
     """How the scene stands, as edited."""
 
     newest_counts = True
@@ -230,7 +230,7 @@ class FindWorld(SceneErrand):
 
 
 @dataclass(frozen=True)
-class Thin(SceneErrand):
+class Thin(SceneTask):
     """Fewer, wider Gaussians for a moving camera."""
 
     scene: "Scene" = field(repr=False)
@@ -243,7 +243,7 @@ class Thin(SceneErrand):
 
 
 @dataclass(frozen=True)
-class ShowPhotos(SceneErrand):
+class ShowPhotos(SceneTask):
     """A scene's photos as pictures, one after another: few of them whole, many small, since all of them whole
     would fill the graphics card."""
 
@@ -260,7 +260,7 @@ class ShowPhotos(SceneErrand):
 
 
 @dataclass(frozen=True)
-class DrawAbove(SceneErrand):
+class DrawAbove(SceneTask):
     """The picture of the map."""
 
     scene: "Scene" = field(repr=False)
@@ -273,7 +273,7 @@ class DrawAbove(SceneErrand):
 
 
 @dataclass(frozen=True)
-class MakeThumbnails(Errand):
+class MakeThumbnails(Task):
     """Decode photos small, and say what their files do."""
 
     paths: tuple[Path, ...]
@@ -284,7 +284,7 @@ class MakeThumbnails(Errand):
 
 
 @dataclass(frozen=True)
-class LookForWork(Errand):
+class LookForWork(Task):
     """Whether work on these photos was begun and kept."""
 
     paths: tuple[Path, ...]
@@ -297,7 +297,7 @@ class LookForWork(Errand):
 
 
 @dataclass(frozen=True)
-class DropWork(Errand):
+class DropWork(Task):
     """Forget the work on these photos."""
 
     paths: tuple[Path, ...]
@@ -340,7 +340,7 @@ def _look_at(photo: "Photo") -> tuple[float | None, tuple[str, ...]]:
 
 
 @dataclass(frozen=True)
-class FindPair(Errand):
+class FindPair(Task):
     """The two photos that make the best scene."""
 
     paths: tuple[Path, ...]

@@ -1,4 +1,4 @@
-"""`langflash lab eval level`: how scenes stand, how large they are, what inventory, plan and clicks get right.
+"""`lab eval level`: how scenes stand, how large they are, what inventory, plan and clicks get right.
 
 Rooms are drawn from their seeds, so up, metres, walls and every thing are known. A scene is made of a room's
 photos by the code as it is (or read from where an earlier run kept it). A Gaussian is of the true thing that

@@ -16,7 +16,7 @@ import numpy as np
 import torch
 from jaxtyping import Float
 
-from langflash_core.geometry.cameras import invert_rigid, pictured, unproject
+from langflash_core.geometry.cameras import invert_rigid, unproject
 from langflash_core.lab.evaluation.alignment import aligned_camera
 from langflash_core.lab.evaluation.posed import as_seen
 from langflash_core.lab.evaluation.walk_measures import lit
@@ -26,6 +26,7 @@ from langflash_core.lab.photos import LabelledPhoto
 from langflash_core.lab.photos.fitting import FittedPhoto
 from langflash_core.lab.training.measures import abs_rel, psnr
 from langflash_core.language.answers import COVERED_ALPHA
+from langflash_core.rig.projected import project_points
 from langflash_core.scene.gaps import filled
 from langflash_core.types import Camera
 
@@ -82,12 +83,11 @@ def nearest_angles(
     here = torch.nn.functional.normalize(pose[:3, 3] - points, dim=-1)
     for other, other_viewmat in photos:
         camera = torch.from_numpy(other_viewmat)
-        x, y, z = pictured(camera, other.K.double(), points.T)
         high, wide = other.depths.shape
-        inside = known & (z > _NEAR) & (x >= 0) & (y >= 0) & (x < wide) & (y < high)
-        places = torch.where(inside, y.floor() * wide + x.floor(), 0.0).long()
-        own = other.depths.double().flatten()[places]
-        sees = inside & (own > 0) & ((z / own.clamp_min(_NEAR) - 1).abs() < SAME)
+        projected = project_points(points.T, camera, other.K.double(), (high, wide))
+        own = projected.looked_up(other.depths.double().flatten())
+        inside = known & projected.inside & (projected.z > _NEAR)
+        sees = inside & (own > 0) & ((projected.z / own.clamp_min(_NEAR) - 1).abs() < SAME)
         there = torch.nn.functional.normalize(invert_rigid(camera)[:3, 3] - points, dim=-1)
         angles = (here * there).sum(-1).clamp(-1, 1).arccos().rad2deg()
         nearest = torch.where(sees, torch.minimum(nearest, angles), nearest)

@@ -146,6 +146,7 @@ def open_shards(folder: Path) -> list[Shard]:
     shards = [Shard(path) for path in sorted(folder.glob("*.safetensors"))]
     if not shards:
         raise ValueError(
-            f"folder: expected shards (*.safetensors) in {folder}, found none; run `lab train cache`"
+            f"folder: expected shards (*.safetensors) in {folder}, found none; "
+            "run `langflash lab train cache`"
         )
     return shards

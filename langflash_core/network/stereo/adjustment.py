@@ -12,7 +12,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float
 
-from langflash_core.network.stereo.bundle import Bundle, Rig, adjusted_bundle
+from langflash_core.network.stereo.bundle import Bundle, Optics, adjusted_bundle
 from langflash_core.network.stereo.graph import Placed
 from langflash_core.network.stereo.inputs import (
     PoseInput,
@@ -26,25 +26,10 @@ from langflash_core.network.stereo.known import agreeing
 from langflash_core.network.stereo.matching import MIN_INLIERS, Matches
 from langflash_core.network.stereo.tracks import Tracks, joined, no_tracks, thinned, with_pairs
 from langflash_core.records import FoundFocal
+from langflash_core.rig.settings import ADJUSTMENT, Adjustment
 
 FEWEST = 3
 """Photos of one lens from which it is sought, and photos from which all are adjusted together."""
-_OBSERVATIONS = (150, 400)
-"""Of each view, in the first round and in the second: more change nothing but the time."""
-_SIGMA = 0.4  # pixels at the working size, of a key point
-_AGREES = 2.0  # times the tolerance of pairs, within which matches join once poses are known
-_SHARED = 3.0
-"""Standard errors of a lens are so many times those of independent observations: errors of key points depend
-on what they show, and go together."""
-_KNOWN = 0.03
-"""Standard error of a focal length, of itself, above which it is not taken."""
-_FIELDS = (20.0, 120.0)  # degrees of the longer side: what photos of rooms are taken with
-_BEND_DOUBT = 0.15  # standard deviation expected of a bend: action cameras have as much
-_BEND_SURE = 3.0  # standard errors from which a bend is one
-_BEND_SEEN = 4.0
-"""Pixels at the working size by which a bend moves a photo's corner, at least: the focal length makes up for
-three quarters of that, and key points are sure to the rest."""
-_STEEPEST = 0.1  # of a straight lens: what a bent one magnifies a photo's corner along the radius, at least
 
 Agreed = dict[tuple[int, int], Matches]
 
@@ -95,6 +80,7 @@ def adjusted_photos(
     agreed: Agreed,
     sought: Sought,
     check: Callable[[], None],
+    settings: Adjustment = ADJUSTMENT,
 ) -> Adjusted | None:
     """Poses of all placed views, and lenses; None where fewer than three are placed.
 
@@ -109,22 +95,28 @@ def adjusted_photos(
     counts = np.bincount(np.array(sought.lenses)[placed], minlength=len(sought.doubts))
     doubts = np.where(counts >= FEWEST, np.array(sought.doubts), 0.0)
     while True:
-        adjusted = _adjusted(list(views), points, start, agreed, np.array(sought.lenses), doubts, check)
+        adjusted = _adjusted(
+            list(views), points, start, agreed, np.array(sought.lenses), doubts, check, settings=settings
+        )
         if adjusted is None:
             return None
         bundle, matches = adjusted
         growths = np.exp(bundle.growths)
-        lost = (doubts > 0) & ~_told(views, np.array(sought.lenses), growths, bundle.errors * _SHARED)
+        lost = (doubts > 0) & ~_told(
+            views, np.array(sought.lenses), growths, bundle.errors * settings.shared, settings=settings
+        )
         if not lost.any():
             break
         doubts = np.where(lost, 0.0, doubts)
     lenses = tuple(
-        FoundFocal(float(growth), float(_SHARED * error), int(count)) if doubt else None
+        FoundFocal(float(growth), float(settings.shared * error), int(count)) if doubt else None
         for growth, error, count, doubt in zip(growths, bundle.errors, counts, doubts, strict=True)
     )
     if sought.bends and any(lenses):
         check()
-        lenses = _with_bends(lenses, list(views), points, bundle, matches, np.array(sought.lenses), doubts)
+        lenses = _with_bends(
+            lenses, list(views), points, bundle, matches, np.array(sought.lenses), doubts, settings=settings
+        )
     of_views = growths[list(sought.lenses)]
     return Adjusted(
         bundle.viewmats, bundle.tracks, bundle.depths, bundle.depth_errors, matches, of_views, lenses
@@ -132,13 +124,17 @@ def adjusted_photos(
 
 
 def _told(
-    views: Sequence[PoseInput], lenses: np.ndarray, growths: np.ndarray, errors: np.ndarray
+    views: Sequence[PoseInput],
+    lenses: np.ndarray,
+    growths: np.ndarray,
+    errors: np.ndarray,
+    settings: Adjustment = ADJUSTMENT,
 ) -> np.ndarray:
     """Which lenses (G,) the photos tell."""
-    known = errors < _KNOWN
+    known = errors < settings.known
     for view, lens in zip(views, lenses, strict=True):
         field = 2 * np.degrees(np.arctan(max(view.size) / 2 / (view.K[0, 0] * growths[lens])))
-        known[lens] &= _FIELDS[0] < field < _FIELDS[1]
+        known[lens] &= settings.fields[0] < field < settings.fields[1]
     return known
 
 
@@ -150,22 +146,28 @@ def _with_bends(
     agreed: Agreed,
     lenses: np.ndarray,
     doubts: np.ndarray,
+    settings: Adjustment = ADJUSTMENT,
 ) -> tuple[FoundFocal | None, ...]:
     """The lenses (G,) with their bends, where photos show some: adjusted again, from straight lines on."""
-    tracks = thinned(_tracks(views, points, agreed), _OBSERVATIONS[-1])
+    tracks = thinned(_tracks(views, points, agreed, settings=settings), settings.observations[-1])
     focals = np.array([view.K[0, 0] for view in views])
-    rig = Rig(focals, lenses, doubts / _SHARED, np.where(doubts > 0, _BEND_DOUBT / _SHARED, 0.0))
+    optics = Optics(
+        focals,
+        lenses,
+        doubts / settings.shared,
+        np.where(doubts > 0, settings.bend_doubt / settings.shared, 0.0),
+    )
     depths = log_depths(views, tracks)
-    bent = adjusted_bundle(straight.viewmats, np.zeros(len(views)), straight.growths, rig, tracks, depths)
-    errors = bent.bend_errors * _SHARED
+    bent = adjusted_bundle(straight.viewmats, np.zeros(len(views)), straight.growths, optics, tracks, depths)
+    errors = bent.bend_errors * settings.shared
     corners = np.zeros(len(doubts))  # |q| there
     for view, lens in zip(views, lenses, strict=True):
         focal = view.K[0, 0] * np.exp(bent.growths[lens])
         corners[lens] = max(corners[lens], np.hypot(*view.size) / 2 / focal)
     diagonal = WORKING_SIDE * np.hypot(*views[0].size) / max(views[0].size)
     moved = np.abs(bent.bends) * corners**2 * diagonal / 2
-    shown = (np.abs(bent.bends) > _BEND_SURE * errors) & (moved > _BEND_SEEN)
-    shown &= 1 + 3 * bent.bends * corners**2 > _STEEPEST
+    shown = (np.abs(bent.bends) > settings.bend_sure * errors) & (moved > settings.bend_seen)
+    shown &= 1 + 3 * bent.bends * corners**2 > settings.steepest
     return tuple(
         replace(own, growth=float(np.exp(growth)), bend=float(bend), bend_error=float(error))
         if own and seen
@@ -182,21 +184,24 @@ def _adjusted(
     lenses: np.ndarray,
     doubts: np.ndarray,
     check: Callable[[], None],
+    settings: Adjustment = ADJUSTMENT,
 ) -> tuple[Bundle, Agreed] | None:
     """The last round's bundle, and the matches that agree with it."""
     logs, growths = np.log(start.scales), np.zeros(len(doubts))
-    doubts = doubts / _SHARED  # what observations say is worth so much less than it seems
+    doubts = doubts / settings.shared  # what observations say is worth so much less than it seems
     focals = np.array([view.K[0, 0] for view in views])
     viewmats, matches, bundle = start.viewmats, agreed, None
-    for most in _OBSERVATIONS:
+    for most in settings.observations:
         check()
-        tracks = thinned(_tracks(views, points, matches), most)
+        tracks = thinned(_tracks(views, points, matches, settings=settings), most)
         if not len(tracks):
             return None
         depths = log_depths(views, tracks)
-        bundle = adjusted_bundle(viewmats, logs, growths, Rig(focals, lenses, doubts), tracks, depths)
+        bundle = adjusted_bundle(viewmats, logs, growths, Optics(focals, lenses, doubts), tracks, depths)
         viewmats, growths = bundle.viewmats, bundle.growths
-        matches = _agreeing(views, points, viewmats, np.exp(growths[lenses]), start.missing, agreed)
+        matches = _agreeing(
+            views, points, viewmats, np.exp(growths[lenses]), start.missing, agreed, settings=settings
+        )
     assert bundle is not None
     return bundle, matches
 
@@ -210,21 +215,26 @@ def log_depths(views: Sequence[PoseInput], tracks: Tracks) -> Float[np.ndarray, 
     return found
 
 
-def _tracks(views: Sequence[PoseInput], points: KeyPoints, agreed: Agreed) -> Tracks:
+def _tracks(
+    views: Sequence[PoseInput], points: KeyPoints, agreed: Agreed, settings: Adjustment = ADJUSTMENT
+) -> Tracks:
     """Pixels from the principal point, square ones. Dense matches are points that two views saw."""
     focals = [view.K[0, 0] for view in views]
     positions = [
         without_camera(own, view) * focal
         for own, view, focal in zip(points.positions, views, focals, strict=True)
     ]
-    sigmas = [_SIGMA * normalised_sigma(view, 1.0) * focal for view, focal in zip(views, focals, strict=True)]
+    sigmas = [
+        settings.sigma * normalised_sigma(view, 1.0) * focal
+        for view, focal in zip(views, focals, strict=True)
+    ]
     exact = {edge: matches.key_points[matches.key_points[:, 0] >= 0] for edge, matches in agreed.items()}
     tracks = joined(positions, exact, sigmas) if positions else no_tracks()
     dense = []
     for (i, j), matches in agreed.items():
         own = matches.key_points[:, 0] < 0
         if own.any():
-            sigma = _SIGMA * matches.sigma * focals[j]
+            sigma = settings.sigma * matches.sigma * focals[j]
             dense.append((i, j, matches.x_i[own] * focals[i], matches.x_j[own] * focals[j], sigma))
     return with_pairs(tracks, dense)
 
@@ -236,6 +246,7 @@ def _agreeing(
     growths: np.ndarray,
     missing: Sequence[int],
     agreed: Agreed,
+    settings: Adjustment = ADJUSTMENT,
 ) -> Agreed:
     """Matches of all pairs of placed views that the poses allow; pairs that needed dense ones keep theirs.
 
@@ -249,7 +260,7 @@ def _agreeing(
             found[i, j] = _through(agreed[i, j], growths[i], growths[j])
         elif len(points.pairs[i, j]) >= MIN_INLIERS:
             own = _through(key_point_matches(views, points, i, j), growths[i], growths[j])
-            wide = replace(own, sigma=own.sigma * _AGREES)
+            wide = replace(own, sigma=own.sigma * settings.agrees)
             own = replace(agreeing(wide, viewmats[j] @ np.linalg.inv(viewmats[i])), sigma=own.sigma)
             if len(own) >= MIN_INLIERS // 2:
                 found[i, j] = own

@@ -3,7 +3,7 @@
 What a sweep leaves is a slow difference between the maps of two photos, some percent of depth: two
 sheets, a halftone where their Gaussians interleave. Every map is carried into those of its neighbours. A
 smooth correction of log depth for each, bilinear between a few knots, takes out what differs slowly
-(one robust least squares over all maps at once), and where they then agree to within `_SAME`
+(one robust least squares over all maps at once), and where they then agree to within `Agreement.same`
 both take the mean, weighted by what each expects of its errors.
 
 Sizes: V views, H W pixels, S knots a side, P pixels that are compared.
@@ -16,18 +16,27 @@ from jaxtyping import Bool, Float
 from torch import Tensor
 from torch.nn import functional as F
 
-from langflash_core.geometry.cameras import invert_rigid, pictured, pixel_grid, unproject
-from langflash_core.network.stereo.prior import DepthMaps
-from langflash_core.network.stereo.sweep import Neighbours, everyone
+from langflash_core.geometry.cameras import pixel_grid
+from langflash_core.rig.neighbours import Neighbours, everyone
+from langflash_core.rig.rig import Rig
+from langflash_core.rig.settings import AGREEMENT, Agreement
 
-_KNOTS = 5  # a side
-_STEP = 4  # every fourth pixel of a row and of a column is compared for the correction
-_ITERATIONS = 3
-_SCALE = 0.04  # relative difference from which a pixel speaks less and less (Geman-McClure)
-_INDEPENDENT = 200  # pixels go together: all compared ones count as this many a view
-_EXPECTED = 0.075  # of a knot, where nothing is compared
-_BEND = 0.06  # of a knot against its neighbour
-_SAME = 0.06  # maps that differ by less, relatively, show one surface
+
+def agreed(rig: Rig, neighbours: Neighbours | None = None, settings: Agreement = AGREEMENT) -> Rig:
+    """Depths that agree where they show one surface; the expected errors stay.
+
+    One view, or views that share nothing, come back as they are.
+
+    Args:
+        rig: with confidences. neighbours: of each view those that it is compared with; None: all others.
+
+    Source: own derivation; the blend is that of depth-map fusion (Merrell et al. 2007).
+    """
+    if len(rig) < 2:
+        return rig
+    near = neighbours or everyone(len(rig))
+    straight = rig.with_logs(straightened(rig, near, settings=settings))
+    return straight.with_logs(blended(straight, near, settings=settings))
 
 
 @dataclass(frozen=True)
@@ -42,44 +51,11 @@ class Carried:
     inside: Bool[Tensor, " P"]
 
 
-def agreed(
-    maps: DepthMaps,
-    viewmats: Float[Tensor, "V 4 4"],
-    Ks: Float[Tensor, "V 3 3"],
-    neighbours: Neighbours | None = None,
-) -> DepthMaps:
-    """Maps (V, H, W) that agree where they show one surface; the expected errors stay.
-
-    One view, or views that share nothing, come back as they are.
-
-    Args:
-        viewmats: (V, 4, 4) of the maps' unit. Ks: (V, 3, 3), pixels of the maps.
-        neighbours: of each view those that it is compared with; None: all others.
-
-    Source: own derivation; the blend is that of depth-map fusion (Merrell et al. 2007).
-    """
-    logs = maps.log_depths
-    if len(logs) < 2:
-        return maps
-    near = neighbours or everyone(len(logs))
-    logs = blended(straightened(logs, viewmats, Ks, near), maps.log_errors, viewmats, Ks, near)
-    return DepthMaps(logs, maps.log_errors)
-
-
-def carried(
-    points: Float[Tensor, "n 3"],
-    viewmats: Float[Tensor, "V 4 4"],
-    Ks: Float[Tensor, "V 3 3"],
-    view: int,
-    other: int,
-    size: tuple[int, int],
-) -> Carried:
-    """Points (P, 3) in the frame of `view`'s camera, seen from `other`, whose picture is `size` = (H, W)."""
-    x, y, depths = pictured(viewmats[other] @ invert_rigid(viewmats[view]), Ks[other], points.T)
-    height, width = size
-    x, y = (x / width * 2 - 1).clamp(-4, 4), (y / height * 2 - 1).clamp(-4, 4)
-    inside = (depths > 1e-4) & (x.abs() <= 1) & (y.abs() <= 1)
-    return Carried(depths.clamp_min(1e-4).log(), torch.stack((x, y), -1), inside)
+def carried(rig: Rig, view: int, other: int, points: Float[Tensor, "3 P"]) -> Carried:
+    """Points (3, P) in the frame of `view`'s camera, seen from `other`."""
+    there = rig.reproject(view, other, points)
+    places = torch.stack([along.clamp(-4, 4) for along in there.scaled], -1)
+    return Carried(there.z.clamp_min(1e-4).log(), places, there.inside)
 
 
 def sampled(maps: Float[Tensor, "H W"], places: Float[Tensor, "P 2"]) -> Float[Tensor, " P"]:
@@ -89,55 +65,46 @@ def sampled(maps: Float[Tensor, "H W"], places: Float[Tensor, "P 2"]) -> Float[T
     ]
 
 
-def straightened(
-    log_depths: Float[Tensor, "V H W"],
-    viewmats: Float[Tensor, "V 4 4"],
-    Ks: Float[Tensor, "V 3 3"],
-    neighbours: Neighbours,
-) -> Float[Tensor, "V H W"]:
+def straightened(rig: Rig, neighbours: Neighbours, settings: Agreement = AGREEMENT) -> Float[Tensor, "V H W"]:
     """Log depths (V, H, W) plus the smooth corrections under which they differ least.
 
     With r the log depth that the other map has less the one that is carried there, and hat functions
     h over the knots, the corrections c minimise sum rho(r + h(x') c_other - h(x) c_own) and what is
     expected of c: small, and alike at neighbouring knots.
     """
-    num_views, height, width = log_depths.shape
-    sparse = (slice(_STEP // 2, None, _STEP), slice(_STEP // 2, None, _STEP))
-    grid = pixel_grid(width, height, like=log_depths) / log_depths.new_tensor([width, height]) * 2 - 1
-    hats = knot_weights(grid.flatten(0, 1))  # (H W, S^2)
+    num_views, (height, width) = len(rig), rig.size
+    sparse = (slice(settings.step // 2, None, settings.step), slice(settings.step // 2, None, settings.step))
+    grid = pixel_grid(width, height, like=rig.depths) / rig.depths.new_tensor([width, height]) * 2 - 1
+    hats = knot_weights(grid.flatten(0, 1), settings=settings)  # (H W, S^2)
     own_hats = hats.unflatten(0, (height, width))[sparse].flatten(0, 1).double()
-    prior = _expectation(hats.device)
-    knots = prior.new_zeros(num_views, _KNOTS**2)
-    logs = log_depths
-    for _ in range(_ITERATIONS):
-        points = [unproject(own.exp(), K)[sparse].flatten(0, 1) for own, K in zip(logs, Ks, strict=True)]
+    prior = _expectation(hats.device, settings=settings)
+    knots = prior.new_zeros(num_views, settings.knots**2)
+    now = rig
+    for _ in range(settings.iterations):
+        points = [now.in_camera(view)[sparse].flatten(0, 1).T for view in range(num_views)]
         normal = torch.block_diag(*[prior] * num_views)
         right = -(knots @ prior).flatten()
-        sums = _comparisons(logs, points, own_hats, viewmats, Ks, neighbours)
+        sums = _comparisons(now, points, own_hats, neighbours, settings=settings)
         knots = knots + torch.linalg.solve(normal + sums[0], right + sums[1]).view_as(knots)
-        logs = log_depths + (knots.to(hats) @ hats.T).view_as(log_depths)
-    return logs
+        logs = rig.log_depths + (knots.to(hats) @ hats.T).view_as(rig.depths)
+        now = rig.with_logs(logs)
+    return now.log_depths
 
 
 def _comparisons(
-    logs: Tensor,
-    points: list[Tensor],
-    own_hats: Tensor,
-    viewmats: Tensor,
-    Ks: Tensor,
-    neighbours: Neighbours,
+    rig: Rig, points: list[Tensor], own_hats: Tensor, neighbours: Neighbours, settings: Agreement = AGREEMENT
 ) -> tuple[Tensor, Tensor]:
     """Normal matrix (V S^2, V S^2) and right side (V S^2,) of all maps and their neighbours', float64."""
-    num_views, size, width = len(logs), (logs.shape[1], logs.shape[2]), _KNOTS**2
+    num_views, width = len(rig), settings.knots**2
     normal = own_hats.new_zeros(num_views, width, num_views, width)
     right, count = own_hats.new_zeros(num_views, width), 0
     for a, others in enumerate(neighbours):
         for b in others:
-            there = carried(points[a], viewmats, Ks, a, b, size)
+            there = carried(rig, a, b, points[a])
             left = own_hats[there.inside]
-            other = knot_weights(there.places[there.inside]).double()
-            gap = (sampled(logs[b], there.places) - there.log_depths)[there.inside].double()
-            weights = (1 + (gap / _SCALE) ** 2) ** -2 / _SCALE**2
+            other = knot_weights(there.places[there.inside], settings=settings).double()
+            gap = (sampled(rig.log_depths[b], there.places) - there.log_depths)[there.inside].double()
+            weights = (1 + (gap / settings.scale) ** 2) ** -2 / settings.scale**2
             weighted, weighted_other = left * weights[:, None], other * weights[:, None]
             normal[a, :, a] += weighted.T @ left
             normal[b, :, b] += weighted_other.T @ other
@@ -146,45 +113,41 @@ def _comparisons(
             right[a] += weighted.T @ gap
             right[b] -= weighted_other.T @ gap
             count += len(gap)
-    share = min(1.0, _INDEPENDENT * num_views / max(count, 1))
+    share = min(1.0, settings.independent * num_views / max(count, 1))
     return normal.flatten(2).flatten(0, 1) * share, right.flatten() * share
 
 
-def knot_weights(places: Float[Tensor, "P 2"]) -> Float[Tensor, "P _"]:
+def knot_weights(places: Float[Tensor, "P 2"], settings: Agreement = AGREEMENT) -> Float[Tensor, "P _"]:
     """Hat functions (P, S^2) of the knots at places (P, 2) of -1 to 1; rows sum to 1."""
-    knots = torch.linspace(-1, 1, _KNOTS, dtype=places.dtype, device=places.device)
-    hats = (1 - (places[..., None] - knots).abs() * ((_KNOTS - 1) / 2)).clamp_min(0)  # (P, 2, S)
+    knots = torch.linspace(-1, 1, settings.knots, dtype=places.dtype, device=places.device)
+    hats = (1 - (places[..., None] - knots).abs() * ((settings.knots - 1) / 2)).clamp_min(0)  # (P, 2, S)
     return (hats[:, 1, :, None] * hats[:, 0, None, :]).flatten(1)
 
 
-def _expectation(device: torch.device) -> Tensor:
+def _expectation(device: torch.device, settings: Agreement = AGREEMENT) -> Tensor:
     """Inverse covariance (S^2, S^2) of one map's knots, float64."""
-    along = torch.eye(_KNOTS, dtype=torch.float64, device=device).diff(dim=0)
-    bend, one = along.T @ along, torch.eye(_KNOTS, dtype=torch.float64, device=device)
+    along = torch.eye(settings.knots, dtype=torch.float64, device=device).diff(dim=0)
+    bend, one = along.T @ along, torch.eye(settings.knots, dtype=torch.float64, device=device)
     rough = torch.kron(bend, one) + torch.kron(one, bend)
-    return torch.eye(_KNOTS**2, dtype=torch.float64, device=device) / _EXPECTED**2 + rough / _BEND**2
+    return (
+        torch.eye(settings.knots**2, dtype=torch.float64, device=device) / settings.expected**2
+        + rough / settings.bend**2
+    )
 
 
-def blended(
-    log_depths: Float[Tensor, "V H W"],
-    log_errors: Float[Tensor, "V H W"],
-    viewmats: Float[Tensor, "V 4 4"],
-    Ks: Float[Tensor, "V 3 3"],
-    neighbours: Neighbours,
-) -> Float[Tensor, "V H W"]:
+def blended(rig: Rig, neighbours: Neighbours, settings: Agreement = AGREEMENT) -> Float[Tensor, "V H W"]:
     """Log depths (V, H, W): where others show the same surface, the mean of all, weighted by 1 / b^2."""
-    height, width = log_depths.shape[1:]
-    blended_logs = []
+    blended_logs, log_errors = [], rig.log_errors
     for a, others in enumerate(neighbours):
-        points = unproject(log_depths[a].exp(), Ks[a]).flatten(0, 1)
-        own = log_depths[a].flatten()
+        points = rig.in_camera(a).flatten(0, 1).T
+        own = rig.log_depths[a].flatten()
         total = (-2 * log_errors[a]).exp().flatten()
         change = torch.zeros_like(own)
         for b in others:
-            there = carried(points, viewmats, Ks, a, b, (height, width))
-            gap = sampled(log_depths[b], there.places) - there.log_depths
-            same = there.inside & (gap.abs() < _SAME)
+            there = carried(rig, a, b, points)
+            gap = sampled(rig.log_depths[b], there.places) - there.log_depths
+            same = there.inside & (gap.abs() < settings.same)
             weight = (-2 * sampled(log_errors[b], there.places)).exp() * same
             change, total = change + weight * gap.nan_to_num(), total + weight
-        blended_logs.append((own + change / total).view(height, width))
+        blended_logs.append((own + change / total).view(rig.size))
     return torch.stack(blended_logs)

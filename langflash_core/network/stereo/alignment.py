@@ -14,12 +14,10 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
+from langflash_core.rig.settings import STRAIGHTENING, Straightening
+
 _PRIOR_SIGMAS = np.array([0.5, 0.05, 0.05, 0.05])  # what is expected of b without any match
-_PRIOR_ERROR = 0.08  # log-depth error that no smooth correction removes
 INDEPENDENT = 50  # errors of one map go together: all its matches count as this many
-_CAUCHY = 2.0
-_ITERATIONS = 15
-_LIMIT = 1.0  # a correction never exceeds a factor of e
 
 
 @dataclass(frozen=True)
@@ -30,11 +28,14 @@ class Correction:
     mean_log_depth: float
 
     def at(
-        self, x: Float[np.ndarray, "*n 2"], log_depths: Float[np.ndarray, "*n"]
+        self,
+        x: Float[np.ndarray, "*n 2"],
+        log_depths: Float[np.ndarray, "*n"],
+        settings: Straightening = STRAIGHTENING,
     ) -> Float[np.ndarray, "*n"]:
         """Correction of log depth (...) at normalised coordinates x (..., 2)."""
         columns = (np.ones_like(log_depths), x[..., 0], x[..., 1], log_depths - self.mean_log_depth)
-        return np.clip(np.stack(columns, -1) @ self.coefficients, -_LIMIT, _LIMIT)
+        return np.clip(np.stack(columns, -1) @ self.coefficients, -settings.limit, settings.limit)
 
 
 NO_CORRECTION = Correction(np.zeros(4), 0.0)
@@ -45,6 +46,7 @@ def fit_correction(
     log_priors: Float[np.ndarray, " n"],
     log_targets: Float[np.ndarray, " n"],
     sigmas: Float[np.ndarray, " n"],
+    settings: Straightening = STRAIGHTENING,
 ) -> Correction:
     """The maximum a posteriori correction; none where there are no points.
 
@@ -59,13 +61,13 @@ def fit_correction(
         return NO_CORRECTION
     mean = float(log_priors.mean())
     design = np.column_stack((np.ones(len(x)), x, log_priors - mean))
-    inverse_sigma = 1 / np.hypot(sigmas, _PRIOR_ERROR)
+    inverse_sigma = 1 / np.hypot(sigmas, settings.prior_error)
     share = min(1.0, INDEPENDENT / len(x))
     ridge = np.diag(1 / _PRIOR_SIGMAS**2)
     coefficients = np.zeros(4)
-    for _ in range(_ITERATIONS):
+    for _ in range(settings.iterations):
         residuals = (log_targets - log_priors - design @ coefficients) * inverse_sigma
-        weights = share * inverse_sigma**2 / (1 + (residuals / _CAUCHY) ** 2)
+        weights = share * inverse_sigma**2 / (1 + (residuals / settings.cauchy) ** 2)
         normal = (design * weights[:, None]).T @ design + ridge
         coefficients = np.linalg.solve(normal, design.T @ (weights * (log_targets - log_priors)))
     return Correction(coefficients, mean)

@@ -32,7 +32,7 @@ _POSE = 7  # turn, shift, log scale of the depth map
 
 
 @dataclass(frozen=True)
-class Rig:
+class Optics:
     """focals (V,): f, pixels. lenses (V,): which lens each camera has. doubts (G,): standard deviations
     expected of g; 0: the lens stays as it is said to be. bend_doubts (G,): of k; 0, or None: lines are
     straight."""
@@ -85,45 +85,47 @@ class _State:
 class _Problem:
     """log_depths (M,): of the maps where the points were seen; shares (M,) weigh them."""
 
-    rig: Rig
+    optics: Optics
     tracks: Tracks
     log_depths: np.ndarray
     shares: np.ndarray
 
     @staticmethod
-    def of(rig: Rig, tracks: Tracks, log_depths: np.ndarray) -> "_Problem":
-        counts = np.bincount(tracks.views, minlength=len(rig.focals))
+    def of(optics: Optics, tracks: Tracks, log_depths: np.ndarray) -> "_Problem":
+        counts = np.bincount(tracks.views, minlength=len(optics.focals))
         shares = np.minimum(1.0, _INDEPENDENT / np.maximum(counts, 1))[tracks.views]
-        return _Problem(rig, tracks, log_depths, shares)
+        return _Problem(optics, tracks, log_depths, shares)
 
     @property
     def sought(self) -> np.ndarray:
         """Which of the C unknowns are: all poses but the first, and the lenses in doubt."""
-        poses = np.arange(_POSE * len(self.rig.focals)) >= _POSE
-        return np.concatenate((poses, self.rig.lens_doubts > 0))
+        poses = np.arange(_POSE * len(self.optics.focals)) >= _POSE
+        return np.concatenate((poses, self.optics.lens_doubts > 0))
 
     @property
     def columns(self) -> np.ndarray:
         """The unknowns of each observation, (M, 9)."""
-        growths = _POSE * len(self.rig.focals) + self.rig.lenses[self.tracks.views]
+        growths = _POSE * len(self.optics.focals) + self.optics.lenses[self.tracks.views]
         poses = _POSE * self.tracks.views[:, None] + np.arange(_POSE)
-        return np.column_stack((poses, growths, growths + len(self.rig.doubts)))
+        return np.column_stack((poses, growths, growths + len(self.optics.doubts)))
 
     def focals(self, state: _State) -> np.ndarray:
         """Of the camera of each observation, in sigmas of the observation."""
         views = self.tracks.views
-        return self.rig.focals[views] * np.exp(state.growths[self.rig.lenses[views]]) / self.tracks.sigmas
+        return (
+            self.optics.focals[views] * np.exp(state.growths[self.optics.lenses[views]]) / self.tracks.sigmas
+        )
 
     def bends(self, state: _State) -> np.ndarray:
         """Of the lens of each observation."""
-        return state.bends[self.rig.lenses[self.tracks.views]]
+        return state.bends[self.optics.lenses[self.tracks.views]]
 
 
 def adjusted_bundle(
     viewmats: Float[np.ndarray, "V 4 4"],
     logs: Float[np.ndarray, " V"],
     growths: Float[np.ndarray, " G"],
-    rig: Rig,
+    optics: Optics,
     tracks: Tracks,
     log_depths: Float[np.ndarray, " M"],
 ) -> Bundle:
@@ -138,7 +140,7 @@ def adjusted_bundle(
 
     Source: Triggs et al. 2000; twin: scipy.optimize.least_squares in tests/network/test_bundle.py.
     """
-    problem = _Problem.of(rig, tracks, log_depths)
+    problem = _Problem.of(optics, tracks, log_depths)
     state = _State(viewmats, logs, np.zeros((0, 3)), growths, np.zeros_like(growths))
     state = replace(state, points=_first_points(state, problem))
     for left in reversed(range(_ROUNDS)):
@@ -220,7 +222,7 @@ def _cost(state: _State, problem: _Problem) -> float:
     residuals = _residuals(state, problem)
     seen = np.log1p((residuals[:, :2] ** 2).sum(1) / _CAUCHY**2).sum()
     depth = (problem.shares * np.log1p((residuals[:, 2] / _CAUCHY) ** 2)).sum()
-    doubts = problem.rig.lens_doubts
+    doubts = problem.optics.lens_doubts
     known = doubts > 0
     lens = ((state.lenses[known] / doubts[known]) ** 2).sum()
     return float(seen + depth + ((state.logs**2).sum() / _SCALE_SIGMA**2 + lens) / _CAUCHY**2)
@@ -294,10 +296,10 @@ class _System:
 
 def _priors(state: _State, problem: _Problem) -> tuple[np.ndarray, np.ndarray]:
     """What is expected of scales and lenses: precisions (C,) and their part of the gradient."""
-    rig = problem.rig
-    poses = np.zeros((len(rig.focals), _POSE))
+    optics = problem.optics
+    poses = np.zeros((len(optics.focals), _POSE))
     poses[:, 6] = 1 / _SCALE_SIGMA**2
-    doubts = rig.lens_doubts
+    doubts = optics.lens_doubts
     lens = np.where(doubts > 0, np.maximum(doubts, 1e-9) ** -2.0, 0.0)
     precisions = np.concatenate((poses.ravel(), lens))
     poses[:, 6] *= state.logs
@@ -363,7 +365,7 @@ def _without_outliers(state: _State, problem: _Problem) -> tuple[_State, _Proble
     if not len(tracks):
         return state, problem
     return replace(state, points=state.points[points]), _Problem.of(
-        problem.rig, tracks, problem.log_depths[rows]
+        problem.optics, tracks, problem.log_depths[rows]
     )
 
 
@@ -378,7 +380,7 @@ def _errors(state: _State, problem: _Problem) -> tuple[float, np.ndarray, float]
     reduced, _, _ = _reduced(_System.of(state, problem), 0.0)
     larger = np.zeros((num_views, _POSE))  # the direction in which everything grows
     larger[:, 3:6], larger[:, 6] = state.viewmats[:, :3, 3], 1
-    larger = np.concatenate((larger.ravel(), np.zeros(len(problem.rig.lens_doubts))))[sought]
+    larger = np.concatenate((larger.ravel(), np.zeros(len(problem.optics.lens_doubts))))[sought]
     reduced += 1e6 * np.outer(larger, larger)
     variances = np.zeros(len(sought))
     variances[sought] = np.diag(np.linalg.inv(reduced)).clip(0) * spread**2

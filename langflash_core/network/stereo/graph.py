@@ -15,21 +15,16 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from langflash_core.network.stereo.matching import RelativePose
+from langflash_core.rig.settings import GRAPH, Graph
 
 Pairs = Mapping[tuple[int, int], RelativePose]
 """Relative poses by views i < j."""
 
-_PARTNERS = 4  # of each photo, whose pairs are looked at
 NEIGHBOURS = 3
 """Of each photo, with which its depth is compared."""
-_LOOP = 4.0  # degrees within which the turns around a triangle must close to confirm its edges
 _TURN_SIGMA, _SHIFT_SIGMA, _SCALE_SIGMA = np.radians(0.3), 0.03, 0.1
 """Errors that matches of a pair share, so that no number of them removes it: radians, scene units per unit
 of depth, log scale."""
-_ROBUST = 3.0  # sigmas from which an edge speaks less and less (Geman-McClure)
-_AGREES = 40.0  # square of the gap in sigmas (7 degrees of freedom) up to which an edge is kept
-_STEPS = 12
-_DAMPING = 1e-6
 
 
 @dataclass(frozen=True)
@@ -44,17 +39,17 @@ class Placed:
 
 
 def chosen_pairs(
-    num_views: int, matches: Mapping[tuple[int, int], Int[np.ndarray, "_ 2"]]
+    num_views: int, matches: Mapping[tuple[int, int], Int[np.ndarray, "_ 2"]], settings: Graph = GRAPH
 ) -> list[tuple[int, int]]:
     """The pairs to look at: those of each photo with the most matches, and a tree that connects all."""
     counts = {edge: len(rows) for edge, rows in matches.items()}
-    best = closest(num_views, counts, _PARTNERS)
+    best = closest(num_views, counts, settings.sources)
     chosen = {edge for edge in counts if edge[1] in best[edge[0]] or edge[0] in best[edge[1]]}
     return sorted(chosen | set(_tree(num_views, counts)))
 
 
 def closest(
-    num_views: int, counts: Mapping[tuple[int, int], int], partners: int = NEIGHBOURS
+    num_views: int, counts: Mapping[tuple[int, int], int], most: int = NEIGHBOURS
 ) -> tuple[tuple[int, ...], ...]:
     """Of each view so many others that share most with it, the first of equal ones first."""
     found = []
@@ -62,7 +57,7 @@ def closest(
         shared = sorted(
             (-count, sum(edge) - view) for edge, count in counts.items() if view in edge and count
         )
-        found.append(tuple(other for _, other in shared[:partners]))
+        found.append(tuple(other for _, other in shared[:most]))
     return tuple(found)
 
 
@@ -84,12 +79,12 @@ def _tree(num_views: int, counts: Mapping[tuple[int, int], int]) -> list[tuple[i
     return tree
 
 
-def placed(num_views: int, pairs: Pairs) -> Placed:
+def placed(num_views: int, pairs: Pairs, settings: Graph = GRAPH) -> Placed:
     """Places of all views: along the best-confirmed tree, then adjusted by all edges."""
-    return adjusted(chained(num_views, pairs, confirmed(pairs)), pairs)
+    return adjusted(chained(num_views, pairs, confirmed(pairs, settings=settings)), pairs, settings=settings)
 
 
-def confirmed(pairs: Pairs) -> dict[tuple[int, int], int]:
+def confirmed(pairs: Pairs, settings: Graph = GRAPH) -> dict[tuple[int, int], int]:
     """How many matches speak for each edge: its own, and in every triangle whose turns close, the fewest
     of the three."""
     counts = {edge: pose.num_inliers for edge, pose in pairs.items()}
@@ -100,7 +95,7 @@ def confirmed(pairs: Pairs) -> dict[tuple[int, int], int]:
     for i, j, k in sorted(loops):
         loop = ((i, j), (j, k), (i, k))
         first, second, direct = (pairs[edge].rotation for edge in loop)
-        if _degrees(second @ first @ direct.T) < _LOOP:
+        if _degrees(second @ first @ direct.T) < settings.loop:
             least = min(pairs[edge].num_inliers for edge in loop)
             for edge in loop:
                 counts[edge] += least
@@ -133,7 +128,7 @@ def chained(num_views: int, pairs: Pairs, strengths: Mapping[tuple[int, int], in
     return Placed(viewmats, scales, missing, tuple(edge for edge in pairs if edge[0] in reached))
 
 
-def adjusted(start: Placed, pairs: Pairs) -> Placed:
+def adjusted(start: Placed, pairs: Pairs, settings: Graph = GRAPH) -> Placed:
     """The poses and scales under which the edges differ least from what their pairs say.
 
     Unknown per view but the first: a turn and a shift before its pose, and its log scale. An edge's
@@ -147,18 +142,20 @@ def adjusted(start: Placed, pairs: Pairs) -> Placed:
         return start
     precisions = {edge: _precision(pairs[edge]) for edge in start.kept}
     viewmats, logs = start.viewmats.copy(), np.log(start.scales)
-    cost = _cost(viewmats, logs, pairs, precisions)
-    for _ in range(_STEPS):
-        step = _step(viewmats, logs, pairs, precisions)
+    cost = _cost(viewmats, logs, pairs, precisions, settings=settings)
+    for _ in range(settings.steps):
+        step = _step(viewmats, logs, pairs, precisions, settings=settings)
         trial, trial_logs = _moved(viewmats, logs, step)
-        lower = _cost(trial, trial_logs, pairs, precisions)
+        lower = _cost(trial, trial_logs, pairs, precisions, settings=settings)
         if not lower < cost:
             break
         done = cost - lower < 1e-6 * cost
         viewmats, logs, cost = trial, trial_logs, lower
         if done:
             break
-    kept = tuple(e for e in precisions if _distance(viewmats, logs, pairs[e], e, precisions[e]) < _AGREES)
+    kept = tuple(
+        e for e in precisions if _distance(viewmats, logs, pairs[e], e, precisions[e]) < settings.agrees
+    )
     return Placed(viewmats, np.exp(logs), start.missing, kept)
 
 
@@ -187,14 +184,14 @@ def _precision(pose: RelativePose) -> np.ndarray:
     return (axes * (values / (1 + values))) @ axes.T / units
 
 
-def _step(viewmats, logs, pairs: Pairs, precisions) -> np.ndarray:
+def _step(viewmats, logs, pairs: Pairs, precisions, settings: Graph = GRAPH) -> np.ndarray:
     """One Gauss-Newton step (V, 7); the first view stays."""
     num_views = len(viewmats)
     normal = np.zeros((num_views, 7, num_views, 7))
     right = np.zeros((num_views, 7))
     for (i, j), precision in precisions.items():
         residual = gap(viewmats, logs, (i, j), pairs[i, j])
-        weighted = precision / (1 + residual @ precision @ residual / _ROBUST**2) ** 2
+        weighted = precision / (1 + residual @ precision @ residual / settings.robust**2) ** 2
         of_i, of_j = _jacobians(viewmats[j] @ np.linalg.inv(viewmats[i]), logs[i])
         for a, left in ((i, of_i), (j, of_j)):
             right[a] -= left.T @ weighted @ residual
@@ -202,7 +199,7 @@ def _step(viewmats, logs, pairs: Pairs, precisions) -> np.ndarray:
                 normal[a, :, b] += left.T @ weighted @ other
     free = (num_views - 1) * 7
     matrix = normal[1:, :, 1:].reshape(free, free)
-    matrix[np.diag_indices(free)] += _DAMPING * (1 + np.diag(matrix))  # views that no edge reaches stay
+    matrix[np.diag_indices(free)] += settings.damping * (1 + np.diag(matrix))
     return np.vstack((np.zeros(7), np.linalg.solve(matrix, right[1:].ravel()).reshape(-1, 7)))
 
 
@@ -223,10 +220,10 @@ def _moved(viewmats: np.ndarray, logs: np.ndarray, step: np.ndarray) -> tuple[np
     return moves @ viewmats, logs + step[:, 6]
 
 
-def _cost(viewmats, logs, pairs: Pairs, precisions) -> float:
+def _cost(viewmats, logs, pairs: Pairs, precisions, settings: Graph = GRAPH) -> float:
     total = 0.0
     for edge, precision in precisions.items():
-        distance = _distance(viewmats, logs, pairs[edge], edge, precision) / _ROBUST**2
+        distance = _distance(viewmats, logs, pairs[edge], edge, precision) / settings.robust**2
         total += distance / (1 + distance)
     return total
 

@@ -17,25 +17,21 @@ from jaxtyping import Float
 from torch import Tensor
 from torch.nn import functional as F
 
-RADII = (2, 4, 8, 14)
-"""Of the windows, in pixels of maps of half the size, where a token has 7: the largest is four tokens."""
-_SHARE = 0.25  # of the expected error, which is mostly of whole surfaces; as large are ripples
-_RANGE = (0.004, 0.015)  # of what is a ripple, relative depth: more is a thing, or a bend
-_FARTHEST = 2.5  # ripples by which a pixel's own depth may differ from the plane
+from langflash_core.rig.settings import FLATTENING, Flattening
 
 
 def flattened(
-    log_depths: Float[Tensor, "V H W"], log_errors: Float[Tensor, "V H W"]
+    log_depths: Float[Tensor, "V H W"], log_errors: Float[Tensor, "V H W"], settings: Flattening = FLATTENING
 ) -> Float[Tensor, "V H W"]:
     """Log depths (V, H, W) without ripples; `log_errors` (V, H, W), what is expected of them, stays."""
     size = (log_depths.shape[-2], log_depths.shape[-1])
     inverse, errors = _halved((-log_depths).exp()), _halved(log_errors.exp())
     inverse = inverse / inverse.mean((2, 3), keepdim=True)
-    ripples = (_SHARE * errors).clamp(*_RANGE)
+    ripples = (settings.share * errors).clamp(*settings.range)
     flat = inverse
-    for radius in RADII:
+    for radius in settings.radii:
         fit, squares = fitted_planes(inverse, radius)
-        off = (fit / inverse - 1) / (_FARTHEST * ripples)
+        off = (fit / inverse - 1) / (settings.farthest * ripples)
         explained = ((1 - squares / ripples**2).clamp_min(0) * (1 - off**2).clamp_min(0)).sqrt()
         flat = flat + (2 * explained).clamp(max=1) * (fit - flat)
     change = (inverse / flat).log().to(log_depths)

@@ -22,20 +22,12 @@ import torch
 from jaxtyping import Bool, Float, UInt8
 from torch import Tensor
 
-from langflash_core.geometry.cameras import invert_rigid, pictured, pixel_grid
-from langflash_core.network.stereo.registration import ONE_SHIFT, resized, smooth
-from langflash_core.network.stereo.sweep import Neighbours
-
-_PLANES = 48
-_NEARER = 2.0  # times nearer than all but a hundredth of the map, where planes begin
-_REACH = 2  # pixels: windows of 5 x 5
-_NOISE = 5.0  # grey values, standard deviation: windows with less show nothing
-_TWO = 2  # neighbours that must show it: others may have it hidden
-_ALIKE = 0.7  # correlation of windows that show one thing
-_BETTER = 0.25  # of correlation, than at the map's depth
-_OTHER = 0.1  # log depth: nearer to the map registration finds it
-_SAME = 0.05  # log depth within which a neighbour says the same
-_ERROR = 0.02  # log depth, of what is found
+from langflash_core.geometry.cameras import invert_rigid, unproject
+from langflash_core.network.stereo.registration import resized, smooth
+from langflash_core.rig.neighbours import Neighbours
+from langflash_core.rig.projected import project_points
+from langflash_core.rig.rig import Rig
+from langflash_core.rig.settings import PLANE_SWEEP, PlaneSweep
 
 
 @dataclass(frozen=True)
@@ -49,34 +41,32 @@ class _Found:
 
 
 def searched(
-    log_depths: Float[Tensor, "V H W"],
+    rig: Rig,
     photos: Sequence[UInt8[np.ndarray, "_ _"]],
-    viewmats: Float[Tensor, "V 4 4"],
-    Ks: Float[Tensor, "V 3 3"],
     neighbours: Neighbours,
     check: Callable[[], None] = lambda: None,
-) -> Float[Tensor, "V H W"]:
-    """Log depths (V, H, W) with what a plane over the whole range explains better; a view with fewer than two
-    neighbours stays as it is.
+    settings: PlaneSweep = PLANE_SWEEP,
+) -> Rig:
+    """Depths with what a plane over the whole range explains better; a view with fewer than two neighbours
+    stays as it is.
 
     Args:
-        photos: (_, _) uint8, grey, of each view, the maps' picture at any size.
-        viewmats: (V, 4, 4) of the maps' unit. Ks: (V, 3, 3), pixels of the maps.
+        photos: (_, _) uint8, grey, of each view, the rig's photos at any size.
         neighbours: of each view.
         check: called before each view is looked at; what it raises ends the work.
     """
-    maps, size = log_depths.cpu(), (log_depths.shape[1], log_depths.shape[2])
-    greys = [resized(photo, size) for photo in photos]
-    scene = _Scene(greys, [own.numpy() for own in maps], viewmats.cpu().double(), Ks.cpu().double())
+    maps = rig.log_depths.cpu()
+    greys = [resized(photo, rig.size) for photo in photos]
+    scene = _Scene(greys, [own.numpy() for own in maps], rig.viewmats.cpu().double(), rig.Ks.cpu().double())
     found = []
     for view, others in enumerate(neighbours):
         check()
-        found.append(_swept(scene, view, others))
+        found.append(_swept(scene, view, others, settings=settings))
     changed = [
-        own + _carried_over(scene, view, found, of)
+        own + _carried_over(scene, view, found, of, settings=settings)
         for view, (own, of) in enumerate(zip(maps, neighbours, strict=True))
     ]
-    return torch.stack(changed).to(log_depths)
+    return rig.with_logs(torch.stack(changed).to(rig.depths))
 
 
 @dataclass(frozen=True)
@@ -102,16 +92,9 @@ class _Scene:
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Where the pixels of a view lie in another's picture at these depths, x and y (H, W), far outside
         where that sees nothing of them, and their log depths there."""
-        height, width = self.size
-        grid = pixel_grid(width, height, like=self.Ks).flatten(0, 1).T
-        K = self.Ks[view]
-        ahead = torch.cat(((grid - K[:2, 2:]) / K.diagonal()[:2, None], torch.ones_like(grid[:1])))
-        points = ahead * torch.from_numpy(log_depths).double().exp().flatten()
-        x, y, z = (
-            along.view(height, width).numpy()
-            for along in pictured(self.pose(view, other), self.Ks[other], points)
-        )
-        inside = (z > 0) & (x > 0) & (y > 0) & (x < width) & (y < height)
+        points = unproject(torch.from_numpy(log_depths).double().exp(), self.Ks[view]).flatten(0, 1).T
+        there = project_points(points, self.pose(view, other), self.Ks[other], self.size)
+        x, y, z, inside = (v.view(self.size).numpy() for v in (there.x, there.y, there.z, there.inside))
         x, y = (np.where(inside, along, -1e4).astype(np.float32) for along in (x, y))
         return x, y, np.log(np.maximum(z, 1e-6))
 
@@ -119,43 +102,55 @@ class _Scene:
 class _Windows:
     """Correlations of a picture (H, W) with others, window by window."""
 
-    def __init__(self, grey: UInt8[np.ndarray, "H W"]):
+    def __init__(self, grey: UInt8[np.ndarray, "H W"], settings: PlaneSweep = PLANE_SWEEP):
         self._grey = grey.astype(np.float32)
-        self._mean = _mean(self._grey)
-        self._variance = np.maximum(_mean(self._grey**2) - self._mean**2, 0)
+        self._mean = _mean(self._grey, settings=settings)
+        self._variance = np.maximum(_mean(self._grey**2, settings=settings) - self._mean**2, 0)
 
-    def alike(self, other: UInt8[np.ndarray, "H W"]) -> Float[np.ndarray, "H W"]:
+    def alike(
+        self, other: UInt8[np.ndarray, "H W"], settings: PlaneSweep = PLANE_SWEEP
+    ) -> Float[np.ndarray, "H W"]:
         """Normalised cross-correlation, in [-1, 1]; towards 0 where there is no more than noise."""
         values = other.astype(np.float32)
-        mean = _mean(values)
-        variance = np.maximum(_mean(values * values) - mean * mean, 0)
-        both = _mean(self._grey * values) - self._mean * mean
-        return both / np.sqrt(self._variance * variance + _NOISE**4)
+        mean = _mean(values, settings=settings)
+        variance = np.maximum(_mean(values * values, settings=settings) - mean * mean, 0)
+        both = _mean(self._grey * values, settings=settings) - self._mean * mean
+        return both / np.sqrt(self._variance * variance + settings.noise**4)
 
 
-def _mean(values: np.ndarray) -> np.ndarray:
-    return cv2.blur(values, (2 * _REACH + 1,) * 2)
+def _mean(values: np.ndarray, settings: PlaneSweep = PLANE_SWEEP) -> np.ndarray:
+    return cv2.blur(values, (2 * settings.reach + 1,) * 2)
 
 
-def _swept(scene: _Scene, view: int, others: Sequence[int]) -> _Found:
+def _swept(scene: _Scene, view: int, others: Sequence[int], settings: PlaneSweep = PLANE_SWEEP) -> _Found:
     """What the neighbours say of one view."""
-    if len(others) < _TWO:
+    if len(others) < settings.votes:
         nothing = np.zeros(scene.size, bool)
         return _Found(scene.log_depths[view], nothing, nothing)
-    windows, own = _Windows(scene.greys[view]), scene.log_depths[view]
-    now = _best([windows.alike(_brought(scene, view, other, own)) for other in others])
-    inverse = _planes(own)
-    volume = [_best([windows.alike(p) for p in _on_plane(scene, view, others, r)]) for r in inverse.tolist()]
+    windows, own = _Windows(scene.greys[view], settings), scene.log_depths[view]
+    now = _best([windows.alike(_brought(scene, view, other, own), settings=settings) for other in others])
+    inverse = _planes(own, settings=settings)
+    volume = [
+        _best([windows.alike(p, settings=settings) for p in _on_plane(scene, view, others, r)])
+        for r in inverse.tolist()
+    ]
     best, most = _largest(volume)
     found = -np.log(_peaks(volume, best, inverse)).astype(np.float32)
-    other = (most > _ALIKE) & (most - now > _BETTER) & (np.abs(found - own) > _OTHER) & np.isfinite(own)
-    return _Found(found, other, now > _ALIKE)
+    other = (
+        (most > settings.alike)
+        & (most - now > settings.better)
+        & (np.abs(found - own) > settings.other)
+        & np.isfinite(own)
+    )
+    return _Found(found, other, now > settings.alike)
 
 
-def _planes(log_depths: Float[np.ndarray, "H W"]) -> Float[np.ndarray, " P"]:
+def _planes(
+    log_depths: Float[np.ndarray, "H W"], settings: PlaneSweep = PLANE_SWEEP
+) -> Float[np.ndarray, " P"]:
     """Inverse depths, in equal steps: the same shift in a neighbour's picture from each to the next."""
     near, far = np.exp(np.quantile(log_depths.astype(np.float64), (0.01, 0.99)))
-    return np.linspace(1 / far, _NEARER / near, _PLANES)
+    return np.linspace(1 / far, settings.nearer / near, settings.planes)
 
 
 def _best(alike: list[np.ndarray]) -> np.ndarray:
@@ -218,7 +213,11 @@ def _on_plane(scene: _Scene, view: int, others: Sequence[int], inverse: float) -
 
 
 def _agreed(
-    scene: _Scene, view: int, found: Sequence[_Found], others: Sequence[int]
+    scene: _Scene,
+    view: int,
+    found: Sequence[_Found],
+    others: Sequence[int],
+    settings: PlaneSweep = PLANE_SWEEP,
 ) -> Bool[np.ndarray, "H W"]:
     """Where a view shows another thing than its map, and enough neighbours have the same place, on their own
     best planes or in their maps."""
@@ -229,16 +228,22 @@ def _agreed(
         inside = x >= 0
         column, row = (np.clip(at.astype(int), 0, most - 1) for at, most in ((x, width), (y, height)))
         theirs = (maps[row, column] for maps in (found[other].log_depths, scene.log_depths[other]))
-        votes += inside & np.any([np.abs(own - log_z) < _SAME for own in theirs], 0)
-    there = (found[view].other & (votes >= _TWO)).astype(np.uint8)
+        votes += inside & np.any([np.abs(own - log_z) < settings.same for own in theirs], 0)
+    there = (found[view].other & (votes >= settings.votes)).astype(np.uint8)
     return cv2.morphologyEx(there, cv2.MORPH_OPEN, np.ones((3, 3), np.uint8)) > 0  # chance is a pixel wide
 
 
-def _carried_over(scene: _Scene, view: int, found: Sequence[_Found], others: Sequence[int]) -> Tensor:
+def _carried_over(
+    scene: _Scene,
+    view: int,
+    found: Sequence[_Found],
+    others: Sequence[int],
+    settings: PlaneSweep = PLANE_SWEEP,
+) -> Tensor:
     """The correction (H, W) of a map: what is found, 0 where the map is confirmed, between them as the
     photo's edges have it."""
-    own, sure = scene.log_depths[view], 1 / (_ERROR**2 * ONE_SHIFT)
-    there = _agreed(scene, view, found, others)
+    own, sure = scene.log_depths[view], 1 / (settings.error**2 * settings.smoothing.one_shift)
+    there = _agreed(scene, view, found, others, settings=settings)
     if not there.any():
         return torch.zeros(own.shape)
     change = np.where(there, found[view].log_depths - own, 0.0)
@@ -246,4 +251,5 @@ def _carried_over(scene: _Scene, view: int, found: Sequence[_Found], others: Seq
         torch.from_numpy((sure * values).astype(np.float32))
         for values in (change, there | found[view].confirmed)
     )
-    return smooth(target, weight, torch.from_numpy(own), scene.greys[view].astype(np.float32))
+    guide = scene.greys[view].astype(np.float32)
+    return smooth(target, weight, torch.from_numpy(own), guide, settings.smoothing)

@@ -6,7 +6,6 @@ error of log depth (the scale of a Laplace distribution).
 
 from dataclasses import dataclass
 
-import torch
 from jaxtyping import Float
 from torch import Tensor, nn
 from torch.nn import functional as F
@@ -14,11 +13,11 @@ from torch.nn import functional as F
 from langflash_core.network.encoders.shared import Tokens
 from langflash_core.network.layers.dpt import DPT
 from langflash_core.network.presets import Preset
+from langflash_core.rig.rig import confidences_of
 
 _TYPICAL_LOG_DEPTH = 0.8  # log of 2.2 m: where an untrained head starts
 _LOG_RANGE = (-4.0, 5.0)  # 2 cm to 150 m: exp never overflows
 LOG_ERROR_RANGE = (-5.0, 1.0)
-_CONFIDENT_ERROR = 0.1  # relative depth error that counts as confidence 1/2
 
 
 @dataclass(frozen=True)
@@ -35,7 +34,7 @@ class DepthMaps:
     @property
     def confidences(self) -> Float[Tensor, "... H W"]:
         """1 / (1 + b / 0.1), in (0, 1)."""
-        return torch.sigmoid(torch.log(torch.tensor(_CONFIDENT_ERROR)) - self.log_errors)
+        return confidences_of(self.log_errors)
 
 
 def resize(maps: Float[Tensor, "n C _ _"], size: tuple[int, int]) -> Float[Tensor, "n C H W"]:

@@ -25,38 +25,16 @@ import cv2
 import numpy as np
 import scipy.sparse
 import torch
-from jaxtyping import Float, UInt8
+from jaxtyping import UInt8
 from scipy.sparse.linalg import cg
 from torch import Tensor
 from torch.nn import functional as F
 
-from langflash_core.geometry.cameras import invert_rigid, pictured, unproject
-from langflash_core.network.stereo.prior import DepthMaps
-from langflash_core.network.stereo.sweep import Neighbours, everyone
-
-_LARGEST = 3  # times the maps' size, at which photos are compared
-_SMALLEST = 12  # pixels of a photo's side, with which flow works
-_ROUNDS = (2, 4)
-"""Neighbours that a view is compared with, round by round, each from where the one before ended: of many
-photos; a second photo alone says all it can at once. On two rendered walks the median error of depth fell
-from 2.6 % to 1.2 (2), 1.0 (4), 1.0 (2 and 2), .84 (2 and 4), .80 % (4 and 4)."""
-_FLOW_ERROR = 0.7  # pixels of the photo
-_THERE_AND_BACK = 0.7  # pixels by which the way back may miss
-_BRIGHTNESS = 10.0  # of 255, difference that is still the same
-_CHANCE = 0.03  # mean certainty of what a neighbour sees, below which it shows something else
-_TEXTURE = 2.0  # squared grey values a pixel, of gradient along a shift at which flow is half as sure
-_FLAT = 0.1  # of that, noise
-ONE_SHIFT = 10  # cells of the maps: flow finds one shift for 16 x 16 pixels and more
-_FARTHEST = 0.3  # log depth that a match may ask for
-_EXPECTED = 0.15  # log depth, what the maps may be off
-_ALIKE = 50  # cells that are off together: errors of the maps are slow
-_STIFF = 3000.0  # of the correction from a cell to the next
-_JUMP = 0.03  # log depth between cells from which it is cut
-_EDGE = 5.0  # of 255, difference of brightness between cells from which it is cut
-_ACROSS = 0.02  # what is left of it there: most edges are drawn on one surface
-_ITERATIONS = 250
-_AT_HAND = 64  # pictures of one size that are kept
-_MARGIN = 1.0  # pixels at the border that say nothing
+from langflash_core.geometry.cameras import invert_rigid, unproject
+from langflash_core.rig.neighbours import Neighbours, everyone
+from langflash_core.rig.projected import project_points
+from langflash_core.rig.rig import Rig
+from langflash_core.rig.settings import REGISTRATION, Registration
 
 
 @dataclass(frozen=True)
@@ -70,19 +48,21 @@ class _Known:
     most: np.ndarray
 
     @staticmethod
-    def of(grey: np.ndarray) -> "_Known":
+    def of(grey: np.ndarray, settings: Registration = REGISTRATION) -> "_Known":
         """S / (S + TEXTURE) of the structure tensor S of a photo (h, w), less its noise."""
         smooth = cv2.GaussianBlur(grey.astype(np.float32), (0, 0), 1)
         across, down = (cv2.Sobel(smooth, cv2.CV_32F, *way) / 8 for way in ((1, 0), (0, 1)))
         products = (np.square(across), across * down, np.square(down))
-        return _Known.of_tensor(*(cv2.blur(product, (7, 7)) for product in products))
+        return _Known.of_tensor(*(cv2.blur(product, (7, 7)) for product in products), settings=settings)
 
     @staticmethod
-    def of_tensor(xx: np.ndarray, xy: np.ndarray, yy: np.ndarray) -> "_Known":
+    def of_tensor(
+        xx: np.ndarray, xy: np.ndarray, yy: np.ndarray, settings: Registration = REGISTRATION
+    ) -> "_Known":
         """Of a structure tensor, squared grey values a pixel."""
         middle, half = (xx + yy) / 2, np.sqrt(np.square((xx - yy) / 2) + np.square(xy))
-        first, second = (np.maximum(energy - _FLAT, 0) for energy in (middle + half, middle - half))
-        first, second = first / (first + _TEXTURE), second / (second + _TEXTURE)
+        first, second = (np.maximum(energy - settings.flat, 0) for energy in (middle + half, middle - half))
+        first, second = first / (first + settings.texture), second / (second + settings.texture)
         share = (first - second) / np.maximum(2 * half, 1e-9)  # of S less its smaller eigenvalue
         rest = second - share * (middle - half)
         return _Known(rest + share * xx, share * xy, rest + share * yy, first)
@@ -106,49 +86,47 @@ class _Matches:
 
 
 def registered(
-    maps: DepthMaps,
+    rig: Rig,
     photos: Sequence[UInt8[np.ndarray, "_ _"]],
-    viewmats: Float[Tensor, "V 4 4"],
-    Ks: Float[Tensor, "V 3 3"],
     neighbours: Neighbours | None = None,
     check: Callable[[], None] = lambda: None,
     each: Callable[[int, Callable[[], Tensor]], Tensor] = lambda view, make: make(),
-) -> DepthMaps:
-    """Maps (V, H, W) whose surfaces show the same in neighbouring photos; the expected errors stay.
+    settings: Registration = REGISTRATION,
+) -> Rig:
+    """Depths whose surfaces show the same in neighbouring photos; the expected errors stay.
 
     Args:
-        photos: (h, w) uint8, grey, of each view, the maps' picture at its own size.
-        viewmats: (V, 4, 4) of the maps' unit. Ks: (V, 3, 3), pixels of the maps.
+        photos: (h, w) uint8, grey, of each view, the rig's photos at their own size.
         neighbours: of each view, the best first; None: all others.
         check: called before each comparison; what it raises ends the work.
-        each: gives the map (H, W) of a view, which it may have made, or know already.
+        each: gives the log depths (H, W) of a view, which it may have made, or know already.
     """
-    logs = maps.log_depths
-    near = neighbours or everyone(len(logs))
-    cells = (logs.shape[1], logs.shape[2])
-    height, width = (min(_LARGEST * g, max(p, g)) for p, g in zip(photos[0].shape, cells, strict=True))
-    if min(height, width) < _SMALLEST:
-        return maps
+    logs, cells = rig.log_depths, rig.size
+    near = neighbours or everyone(len(rig))
+    height, width = (
+        min(settings.largest * g, max(p, g)) for p, g in zip(photos[0].shape, cells, strict=True)
+    )
+    if min(height, width) < settings.smallest:
+        return rig
     guides = [resized(photo, cells).astype(np.float32) for photo in photos]
-    pictures = _Pictures.of(photos, (height, width), Ks, cells)
+    pictures = _Pictures.of(photos, (height, width), rig.Ks, cells, settings)
 
     def corrected(view: int) -> Tensor:
         own, others = logs[view].cpu(), near[view]
-        for partners in _ROUNDS if len(others) > 1 else (1,):
+        for most in settings.rounds if len(others) > 1 else (1,):
             target, weight = torch.zeros(2, *cells)
             depths = F.interpolate(own[None, None], size=pictures.size, mode="bilinear")[0, 0]
-            known = _Known.of(pictures.grey(view))
-            for other in others[:partners]:
+            known = _Known.of(pictures.grey(view), settings)
+            for other in others[:most]:
                 check()
-                pose = (viewmats[other] @ invert_rigid(viewmats[view])).cpu()
-                change, counts = pictures.compared(view, other, depths, known, pose)
+                pose = (rig.viewmats[other] @ invert_rigid(rig.viewmats[view])).cpu()
+                change, counts = pictures.compared(view, other, depths, known, pose, settings=settings)
                 target += _cells(counts * change, cells)
                 weight += _cells(counts, cells)
-            own = own + smooth(target, weight, own, guides[view])
+            own = own + smooth(target, weight, own, guides[view], settings=settings)
         return own.to(logs)
 
-    found = [each(view, partial(corrected, view)) for view in range(len(logs))]
-    return DepthMaps(torch.stack(found), maps.log_errors)
+    return rig.with_logs(torch.stack([each(view, partial(corrected, view)) for view in range(len(rig))]))
 
 
 @dataclass(frozen=True)
@@ -161,22 +139,32 @@ class _Pictures:
 
     @staticmethod
     def of(
-        photos: Sequence[np.ndarray], size: tuple[int, int], Ks: Tensor, cells: tuple[int, int]
+        photos: Sequence[np.ndarray],
+        size: tuple[int, int],
+        Ks: Tensor,
+        cells: tuple[int, int],
+        settings: Registration = REGISTRATION,
     ) -> "_Pictures":
         """Ks: pixels of maps of so many cells."""
         ratio = torch.tensor([size[1] / cells[1], size[0] / cells[0], 1.0])
-        grey = lru_cache(_AT_HAND)(lambda view: resized(photos[view], size))
+        grey = lru_cache(settings.at_hand)(lambda view: resized(photos[view], size))
         return _Pictures(grey, size, Ks.cpu() * ratio[:, None])
 
     def compared(
-        self, view: int, other: int, depths: Tensor, known: _Known, pose: Tensor
+        self,
+        view: int,
+        other: int,
+        depths: Tensor,
+        known: _Known,
+        pose: Tensor,
+        settings: Registration = REGISTRATION,
     ) -> tuple[Tensor, Tensor]:
         """Changes of log depth (h, w) that another photo asks for, and what each counts; depths: log, (h,
         w)."""
         greys, Ks = (self.grey(view), self.grey(other)), (self.Ks[view], self.Ks[other])
-        matches = _matched(depths, *greys, *Ks, pose, known)
-        change, moved = _triangulated(depths, matches, *Ks, pose, known)
-        return change, torch.from_numpy(matches.sure) * moved / (_FLOW_ERROR**2 * ONE_SHIFT)
+        matches = _matched(depths, *greys, *Ks, pose, known, settings=settings)
+        change, moved = _triangulated(depths, matches, *Ks, pose, known, settings=settings)
+        return change, torch.from_numpy(matches.sure) * moved / (settings.flow_error**2 * settings.one_shift)
 
 
 def resized(photo: UInt8[np.ndarray, "h w"], size: tuple[int, int]) -> UInt8[np.ndarray, "H W"]:
@@ -199,11 +187,14 @@ def _matched(
     other_K: Tensor,
     pose: Tensor,
     known: _Known,
+    settings: Registration = REGISTRATION,
 ) -> _Matches:
     height, width = log_depths.shape
     points = unproject(log_depths.exp(), K).flatten(0, 1).T
-    x, y, z = (along.view(height, width).numpy() for along in pictured(pose, other_K, points))
-    seen = (z > 0) & (x > _MARGIN) & (y > _MARGIN) & (x < width - _MARGIN) & (y < height - _MARGIN)
+    there = project_points(points, pose, other_K, (height, width))
+    x, y, seen = (
+        along.view(height, width).numpy() for along in (there.x, there.y, there.within(settings.margin))
+    )
     x, y = (np.where(seen, along, -1e4).astype(np.float32) for along in (x, y))
     brought = _looked_up(other, x - 0.5, y - 0.5)
     flow = cv2.DISOpticalFlow.create(cv2.DISOPTICAL_FLOW_PRESET_MEDIUM)
@@ -216,10 +207,10 @@ def _matched(
     differs = _looked_up(brought, columns, rows).astype(np.float32) - grey
     differs -= cv2.blur(differs, (15, 15))
     differs = cv2.blur(np.square(differs), (5, 5))
-    sure = 1 / (1 + missed / _THERE_AND_BACK**2) ** 2 / (1 + differs / _BRIGHTNESS**2)
+    sure = 1 / (1 + missed / settings.there_and_back**2) ** 2 / (1 + differs / settings.brightness**2)
     inside = seen & (_looked_up(seen.astype(np.float32), columns, rows, cv2.BORDER_CONSTANT) > 0.999)
     sure = np.where(inside, sure, 0.0)
-    if sure.sum() < _CHANCE * seen.sum():
+    if sure.sum() < settings.chance * seen.sum():
         sure[:] = 0
     return _Matches(_looked_up(x, columns, rows), _looked_up(y, columns, rows), sure)
 
@@ -231,7 +222,13 @@ def _looked_up(
 
 
 def _triangulated(
-    log_depths: Tensor, matches: _Matches, K: Tensor, other_K: Tensor, pose: Tensor, known: _Known
+    log_depths: Tensor,
+    matches: _Matches,
+    K: Tensor,
+    other_K: Tensor,
+    pose: Tensor,
+    known: _Known,
+    settings: Registration = REGISTRATION,
 ) -> tuple[Tensor, Tensor]:
     """Changes of log depth (h, w) that bring each pixel nearest to its match, as far as that is known, and
     squared pixels (h, w) of what is known that the match moves for one unit nearer; 0 both where no depth
@@ -252,7 +249,7 @@ def _triangulated(
     inverse = torch.from_numpy(known.product(*away, *moving)) / square.clamp_min(1e-12)
     ahead = ray[..., 2] + pose[2, 3] * inverse
     usable = (inverse > 1e-6) & (ahead > 1e-3) & (square > 1e-12)
-    change = (-inverse.clamp_min(1e-6).log() - log_depths).clamp(-_FARTHEST, _FARTHEST)
+    change = (-inverse.clamp_min(1e-6).log() - log_depths).clamp(-settings.farthest, settings.farthest)
     pace = torch.where(usable, (-log_depths).exp() / ahead.clamp_min(1e-3) * other_K[0, 0], 0.0)
     return torch.where(usable, change, 0.0).nan_to_num(), (square * pace**2).nan_to_num()
 
@@ -265,30 +262,40 @@ def _turned_back(vectors: list[Tensor], pose: Tensor) -> list[np.ndarray]:
     return [(cosine * x + sine * y).numpy(), (cosine * y - sine * x).numpy()]
 
 
-def smooth(target: Tensor, weight: Tensor, log_depths: Tensor, guide: np.ndarray) -> Tensor:
+def smooth(
+    target: Tensor,
+    weight: Tensor,
+    log_depths: Tensor,
+    guide: np.ndarray,
+    settings: Registration = REGISTRATION,
+) -> Tensor:
     """The correction x (H, W) that minimises sum w (x - t)^2 + x^2 / s^2 + sum g (x_i - x_j)^2 over cells and
     their neighbours, g cut where depth jumps or is no number, and at edges of the guide (H, W), the photo in
     cells; target: w t."""
     height, width = log_depths.shape
     across, down = (
-        _STIFF * _alike(guide, dim) * torch.exp(-((log_depths.diff(dim=dim) / _JUMP) ** 2)).nan_to_num()
+        settings.stiff
+        * _alike(guide, dim, settings=settings)
+        * torch.exp(-((log_depths.diff(dim=dim) / settings.jump) ** 2)).nan_to_num()
         for dim in (1, 0)
     )
     cells = np.arange(height * width).reshape(height, width)
     first = np.concatenate((cells[:, :-1].ravel(), cells[:-1].ravel()))
     second = np.concatenate((cells[:, 1:].ravel(), cells[1:].ravel()))
     ties = np.concatenate((across.ravel(), down.ravel())).astype(np.float64)
-    own = weight.double().numpy().ravel() + 1 / (_ALIKE * _EXPECTED**2)
+    own = weight.double().numpy().ravel() + 1 / (settings.alike * settings.expected**2)
     own += np.bincount(first, ties, cells.size) + np.bincount(second, ties, cells.size)
     places = (np.concatenate((cells.ravel(), first, second)), np.concatenate((cells.ravel(), second, first)))
     system = scipy.sparse.coo_matrix((np.concatenate((own, -ties, -ties)), places)).tocsr()
     right = target.double().numpy().ravel()
     found, _ = cg(
-        system, right, x0=right / own, rtol=1e-3, maxiter=_ITERATIONS, M=scipy.sparse.diags(1 / own)
+        system, right, x0=right / own, rtol=1e-3, maxiter=settings.iterations, M=scipy.sparse.diags(1 / own)
     )
     return torch.from_numpy(found.reshape(height, width)).float()
 
 
-def _alike(guide: np.ndarray, dim: int) -> Tensor:
-    """Of each two cells that follow each other, 1 where the guide shows one thing, `_ACROSS` at an edge."""
-    return torch.from_numpy(_ACROSS + (1 - _ACROSS) * np.exp(-np.square(np.diff(guide, axis=dim) / _EDGE)))
+def _alike(guide: np.ndarray, dim: int, settings: Registration = REGISTRATION) -> Tensor:
+    """Of each two cells that follow each other, 1 where the guide shows one thing, less at an edge."""
+    return torch.from_numpy(
+        settings.across + (1 - settings.across) * np.exp(-np.square(np.diff(guide, axis=dim) / settings.edge))
+    )

@@ -21,16 +21,11 @@ from langflash_core.network.encoders.shared import Tokens
 from langflash_core.network.layers.dpt import ResidualUnit
 from langflash_core.network.presets import GuidedDepth
 from langflash_core.network.stereo.prior import LOG_ERROR_RANGE, DepthMaps, resize
+from langflash_core.rig.neighbours import Neighbours, everyone
+from langflash_core.rig.projected import see_points
 
-Neighbours = Sequence[Sequence[int]]
-"""Of each view the others that it is compared with."""
 _TYPICAL_LOG_ERROR = -1.5  # centres the error channel that the network reads
 _AT_ONCE = 10_000  # places whose vectors are gathered together
-
-
-def everyone(num_views: int) -> Neighbours:
-    """All other views."""
-    return [[other for other in range(num_views) if other != view] for view in range(num_views)]
 
 
 @dataclass(frozen=True)
@@ -100,7 +95,11 @@ def sweep_correlation(
             relative = viewmats[other] @ invert_rigid(viewmats[view])
             turned = relative[:3, :3] @ directions[view]
             pos_o = turned[..., None] * depths + relative[:3, 3, None, None]  # (3, h w, P)
-            ndc, seen = _projected(pos_o, Ks[other], (height, width))
+            there = see_points(pos_o.flatten(1), Ks[other], (height, width))
+            ndc = torch.stack(there.scaled)
+            inside = (there.z > 0) & (ndc.abs() <= 1).all(0)  # of a pixel on the border half is there
+            seen = inside.view_as(depths).to(depths)
+            ndc = torch.where(inside, ndc, 0.0).unflatten(1, depths.shape)
             for c, total in zip(compared, totals, strict=True):
                 total += _products(c, view, other, ndc) * seen[..., None]
             count = count + seen
@@ -109,17 +108,6 @@ def sweep_correlation(
             found.append(mean.permute(2, 1, 0).unflatten(2, (height, width)))
         visibilities.append((count / max(len(others), 1)).T.unflatten(1, (height, width)))
     return [torch.stack(found) for found in correlations], torch.stack(visibilities)
-
-
-def _projected(pos_c: Tensor, K: Tensor, size: tuple[int, int]) -> tuple[Tensor, Tensor]:
-    """Where points (3, X, P) lie in a picture of (h, w), as (2, X, P) of -1 to 1, and (X, P) 1 where they
-    are in view; the others are said to lie in the middle."""
-    z = pos_c[2]
-    scale, shift = K.diagonal()[:2, None, None], K[:2, 2, None, None]
-    ends = pos_c.new_tensor([size[1], size[0]])[:, None, None]
-    ndc = (pos_c[:2] / z.clamp_min(1e-4) * scale + shift) / ends * 2 - 1
-    seen = (z > 1e-4) & (ndc.abs() <= 1).all(0)
-    return torch.where(seen, ndc, 0.0), seen.to(pos_c.dtype)
 
 
 def _products(compared: Compared, view: int, other: int, ndc: Tensor) -> Tensor:

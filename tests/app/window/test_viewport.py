@@ -242,7 +242,7 @@ def test_only_the_picture_on_show_is_scored(context) -> None:
     with context:
         viewport = Viewport(context)
         viewport.set_scene(1, scene)
-        viewport.ask((0,), query, state.asking.lapses)
+        viewport.ask((0,), query, state.asking.revision)
         view = None
         for _ in range(600):
             state = replace(state, now=state.now + 0.05)
@@ -252,11 +252,11 @@ def test_only_the_picture_on_show_is_scored(context) -> None:
                 break
             time.sleep(0.01)
         assert view is not None and viewport.view(state) is None, "once"
-        viewport.ask((0,), query, state.asking.lapses)
+        viewport.ask((0,), query, state.asking.revision)
         assert viewport.view(state.with_scene(pose=orbit(state.scene.pose, 0.2, 0.0))) is None, (
             "of another place"
         )
-        lapsed = state.with_asking(lapses=state.asking.lapses + 1)
+        lapsed = state.with_asking(revision=state.asking.revision + 1)
         assert viewport.view(lapsed) is None, "of a question that holds no more"
         assert viewport.view(state) is not None
         viewport.release()
@@ -434,7 +434,7 @@ def test_what_a_phrase_does_not_mean_leaves_the_picture_and_no_splat_is_drawn(co
             query = compile_spoken(scene, space, [phrase])
             asked = replace(state.asking.prompts[0], text=phrase, calibrated=query.threshold)
             state = state.with_asking(prompts=(asked,))
-            viewport.ask((asked.key,), query, state.asking.lapses)
+            viewport.ask((asked.key,), query, state.asking.revision)
             view = None
             for _ in range(600):
                 state = replace(state, now=state.now + 0.05)
@@ -445,7 +445,7 @@ def test_what_a_phrase_does_not_mean_leaves_the_picture_and_no_splat_is_drawn(co
                     break
                 time.sleep(0.01)
             assert view is not None
-            parts = (view.relevance, view.frame, view.camera, view.query, view.lapses)
+            parts = (view.relevance, view.frame, view.camera, view.query, view.revision)
             done = Answer(1, view.keys, *parts, view.others, view.up, view.cuts, view.name).run(lambda: False)
             told = [each for each in done if isinstance(each, Narrowed | Answered)]
             narrowed = next((each for each in told if isinstance(each, Narrowed)), None)

@@ -11,7 +11,7 @@ from PIL import Image
 from app.window.asking import commands as ask
 from app.window.asking.work import Answer, Encode
 from app.window.commands import Command, OfScene, ShowPicture
-from app.window.requests import Errand, Job
+from app.window.requests import Job, Task
 from app.window.scene import commands as show
 from app.window.scene import work
 from app.window.worker import Worker
@@ -65,7 +65,7 @@ class Predicting(Job):
 
 
 @dataclass(frozen=True)
-class Counting(Errand):
+class Counting(Task):
     """Makes a tensor that is kept."""
 
     def run(self, stopping):
@@ -80,7 +80,7 @@ class Kept(Command):
         return state
 
 
-def test_tensors_of_errands_within_a_prediction_can_be_changed_after_it(worker: Worker) -> None:
+def test_tensors_of_tasks_within_a_prediction_can_be_changed_after_it(worker: Worker) -> None:
     worker.submit(Predicting())
     wait_for(worker, show.Progressed)
     worker.submit(Counting())
@@ -186,7 +186,7 @@ def test_stop_is_quick_and_repeatable(scene_file: Path) -> None:
 
 @pytest.mark.parametrize("began", [True, False])
 def test_what_was_to_be_saved_is_saved_before_the_end(scene_file: Path, tmp_path: Path, began: bool) -> None:
-    """Behind other errands, and even where the thread has not started yet."""
+    """Behind other tasks, and even where the thread has not started yet."""
     scene = load(scene_file)
     worker = Worker(begins=began)
     worker.submit(work.MakeThumbnails((scene_file,) * 50))

@@ -40,7 +40,7 @@ def add_bench_network(commands) -> None:
 
 
 def add_eval(commands) -> None:
-    """`langflash eval`."""
+    """`langflash lab eval`."""
     actions = new_actions(commands, "eval", "judge how good a checkpoint is on rooms that it has never seen")
     rooms = new_command(
         actions, "rooms", "geometry, pictures, labels and phrases, with trivial answers beside"
@@ -132,7 +132,7 @@ def _add_posed(actions) -> None:
 
 def _add_labels(actions) -> None:
     command = new_command(
-        actions, "labels", "labels as `langflash labels` makes them, of clips through rendered rooms"
+        actions, "labels", "labels as `langflash lab labels` makes them, of clips through rendered rooms"
     )
     command.add_argument("pack", type=Path, metavar="PACK", help="furniture, made by rooms pack")
     command.add_argument(

@@ -209,5 +209,5 @@ def test_what_a_view_says_of_a_reading_is_noted_with_its_phrase() -> None:
     state = after(asked("blue chair"), ask.Narrowed(**told, notes=((0, "blue chair", "none looks blue"),)))
     assert state.asking.prompts[0].note == "none looks blue"
     other = ask.Narrowed(**told, notes=((0, "red chair", "another"),))
-    lapsed = ask.Narrowed(**told, notes=((0, "blue chair", "late"),), lapses=7)
+    lapsed = ask.Narrowed(**told, notes=((0, "blue chair", "late"),), revision=7)
     assert after(state, other, lapsed).asking.prompts[0].note == "none looks blue"

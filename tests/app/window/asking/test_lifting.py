@@ -14,7 +14,7 @@ from app.window.editing import commands as edit
 from app.window.effects import Hands
 from app.window.frame import table
 from app.window.kit import theme, widgets
-from app.window.requests import Errand, Job
+from app.window.requests import Job, Task
 from app.window.scene import commands as show
 from app.window.scene.effects import SceneEffects
 from app.window.scene.work import describe_scene
@@ -33,7 +33,7 @@ class Desk:
     """A session without its window, with the effects of scene and asking."""
 
     state: State = field(default_factory=State)
-    asked: list[Job | Errand] = field(default_factory=list)
+    asked: list[Job | Task] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         hands = Hands(self.perform, self.perform, self.asked.append, lambda: None, lambda: self.state.now)

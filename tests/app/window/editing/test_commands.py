@@ -195,7 +195,7 @@ def test_names_and_denials_make_scores_lapse_and_can_be_undone(shown: State) -> 
     scored = after(shown, ask.EditPrompt(0, "wall"), ask.Answered(((0, "wall", 0.9),)))
     for lesson in (edit.RenameAtom(0, "wall"), edit.DenyAtom(0, "wall")):
         taught = after(scored, lesson)
-        assert taught.asking.prompts[0].score is None and taught.asking.lapses > scored.asking.lapses
+        assert taught.asking.prompts[0].score is None and taught.asking.revision > scored.asking.revision
         assert after(taught, edit.Undo()).editing.marks == shown.editing.marks
     assert after(scored, edit.DenyAtom(9, "wall"), edit.DenyAtom(0, " ")).editing == scored.editing
 
@@ -234,9 +234,9 @@ def test_boxes_and_strokes_are_pixels() -> None:
 def answered(state: State) -> State:
     """With the phrase "door" found in the view on show."""
     state = after(state, ask.EditPrompt(0, "door"), do.Tick(1.0))
-    lapses = state.asking.lapses
+    revision = state.asking.revision
     histogram = Histogram(0, "door", (1,) * BINS)
-    return after(state, ask.Answered(((0, "door", 0.99),), lapses), ask.Binned((histogram,), lapses))
+    return after(state, ask.Answered(((0, "door", 0.99),), revision), ask.Binned((histogram,), revision))
 
 
 @pytest.mark.parametrize(
@@ -250,7 +250,7 @@ def test_a_score_goes_with_what_it_rests_on(shown: State, change: do.Command) ->
     assert before.asking.prompts[0].found and before.asking.histograms
     state = after(before, change)
     assert state.asking.prompts[0].score is None and state.asking.histograms == () and state.wants_maps
-    late = after(state, ask.Answered(((0, "door", 0.99),), before.asking.lapses))
+    late = after(state, ask.Answered(((0, "door", 0.99),), before.asking.revision))
     assert late == state  # the answer was about Gaussians that are gone
     again = answered(state)
     assert again.asking.prompts[0].score == 0.99

@@ -22,7 +22,7 @@ from app.window.recovery.effects import KEEP_AFTER, RecoveryEffects
 from app.window.recovery.keeper import Keeper
 from app.window.recovery.sessions import EDITED
 from app.window.recovery.work import KeepCopy
-from app.window.requests import Errand, Job, SceneErrand
+from app.window.requests import Job, SceneTask, Task
 from app.window.scene import commands as show
 from app.window.scene.effects import SceneEffects
 from app.window.scene.work import describe_scene
@@ -51,7 +51,7 @@ class Desk:
     """A session without its window, with the effects of scene, editing and recovery."""
 
     state: State = field(default_factory=State)
-    asked: list[Job | Errand] = field(default_factory=list)
+    asked: list[Job | Task] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         hands = Hands(self.perform, self.perform, self.asked.append, lambda: None, lambda: self.state.now)
@@ -81,7 +81,7 @@ class Desk:
                 self.perform(request.run(serial, lambda *_: None, lambda: False))
                 continue
             for command in request.run(lambda: False):
-                about = isinstance(request, SceneErrand)
+                about = isinstance(request, SceneTask)
                 self.perform(OfScene(request.serial, command) if about else command)
 
     def rest(self) -> None:
@@ -195,7 +195,7 @@ def test_the_margin_is_looked_for_again_where_the_selection_is_another(desk: Des
     desk.perform(mending.AskToHide("blur"))
     late = desk.asked.pop()
     desk.perform(edit.Found(Mask.first(COUNT, BLOCK // 2), "replace", "here"))
-    assert isinstance(late, Errand)
+    assert isinstance(late, Task)
     desk.perform(*late.run(lambda: False))  # comes too late
     asked, marks = desk.state.editing.hiding, desk.state.editing.marks
     assert asked is not None and marks is not None and asked.mask(marks) is None

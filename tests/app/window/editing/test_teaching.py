@@ -22,7 +22,7 @@ def opened(*seeds: int) -> State:
     return apply(State(), SceneArrived(describe_scene(scene, serial=1, name="stripes")))
 
 
-def errand(state: State):
+def task(state: State):
     info, marks = state.scene.info, state.editing.marks
     assert info is not None and marks is not None
     return info.serial, info.memory, marks
@@ -37,11 +37,11 @@ def run(state: State, request) -> State:
 def test_names_that_are_kept_in_one_room_are_taken_in_another_and_undone(tmp_path):
     path, first, second = tmp_path / "deep" / teaching.WORDS, opened(0, 1), opened(2, 3)
     first = apply(first, RenameAtom(1, "heirloom"))
-    first = run(first, work.KeepLessons(*errand(first), path))
+    first = run(first, work.KeepLessons(*task(first), path))
     assert "Kept 1" in told(first) and [one.name for one in read_lessons(path).lessons] == ["heirloom"]
     second = apply(second, teaching.TakeWords())
     assert second.editing.waiting
-    second = run(second, work.FindLessons(*errand(second), path))
+    second = run(second, work.FindLessons(*task(second), path))
     assert not second.editing.waiting and "heirloom" in told(second)
     assert second.editing.marks is not None
     assert [atom.name for atom in second.editing.marks.atoms] == ["", "heirloom", ""]
@@ -51,9 +51,9 @@ def test_names_that_are_kept_in_one_room_are_taken_in_another_and_undone(tmp_pat
 
 def test_nothing_to_keep_or_to_take_is_said(tmp_path):
     path, state = tmp_path / teaching.WORDS, opened(0, 1)
-    assert "Name a group first" in told(run(state, work.KeepLessons(*errand(state), path)))
-    assert "Nothing is saved yet" in told(run(state, work.FindLessons(*errand(state), path)))
+    assert "Name a group first" in told(run(state, work.KeepLessons(*task(state), path)))
+    assert "Nothing is saved yet" in told(run(state, work.FindLessons(*task(state), path)))
     assert "No group here" in told(apply(state, teaching.WordsFound(())))
     path.write_text("{")
     with pytest.raises(PromptError, match="no usable vocabulary"):
-        run(state, work.FindLessons(*errand(state), path))
+        run(state, work.FindLessons(*task(state), path))

@@ -12,7 +12,7 @@ from app.window.editing import commands as edit
 from app.window.editing import work
 from app.window.editing.state import Reading, Region
 from app.window.editing.things import ThingFound
-from app.window.requests import SceneErrand
+from app.window.requests import SceneTask
 from app.window.scene.commands import SceneArrived
 from app.window.scene.work import describe_scene
 from app.window.state import State
@@ -40,7 +40,7 @@ def scene_of(info, marks=None):
     return info.serial, info.memory, marks or info.history.marks
 
 
-def result(request: SceneErrand) -> Any:
+def result(request: SceneTask) -> Any:
     """The command that a request comes to."""
     (command,) = request.run(lambda: False)
     return command

@@ -168,8 +168,8 @@ def test_without_language_it_says_why(room: Scene) -> None:
     shown = after(State(), SceneArrived(describe_scene(mute, 1, "mute")), take.ShowInventory(True))
     info, marks = shown.scene.info, shown.editing.marks
     assert info is not None and marks is not None
-    errand = TakeInventory(1, info.memory, marks)
-    told = after(shown, *errand.failed("the scene has no language"))
+    task = TakeInventory(1, info.memory, marks)
+    told = after(shown, *task.failed("the scene has no language"))
     assert told.listing.rows == () and "no language" in told.listing.problem
     assert after(told, SceneArrived(describe_scene(room, 2, "room"))).listing.rows is None
 

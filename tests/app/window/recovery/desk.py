@@ -6,7 +6,7 @@ from app.window.commands import Command, OfScene, Tick, apply
 from app.window.effects import Hands
 from app.window.recovery.effects import RecoveryEffects
 from app.window.recovery.keeper import Keeper
-from app.window.requests import Errand, Job, SceneErrand
+from app.window.requests import Job, SceneTask, Task
 from app.window.state import State
 
 
@@ -15,7 +15,7 @@ class Desk:
     """A session without its window: performs commands, and runs requests when told to."""
 
     state: State = field(default_factory=State)
-    asked: list[Job | Errand] = field(default_factory=list)
+    asked: list[Job | Task] = field(default_factory=list)
 
     def __post_init__(self) -> None:
         self.keeper = Keeper()
@@ -39,7 +39,7 @@ class Desk:
                 self.perform(request.run(7, lambda *_: None, lambda: False))
                 continue
             for command in request.run(lambda: False):
-                about = isinstance(request, SceneErrand)
+                about = isinstance(request, SceneTask)
                 self.perform(OfScene(request.serial, command) if about else command)
 
     def pass_time(self, seconds: float) -> None:

@@ -8,7 +8,7 @@ import pytest
 import torch
 
 from app.window.recovery import edits, work
-from app.window.requests import Errand
+from app.window.requests import Task
 from app.window.scene.work import LoadScene, describe_scene
 from langflash_core.language.spaces import language_space
 from langflash_core.scene import edits_file
@@ -32,7 +32,7 @@ def edited(info):
     return history.edited("Name", rename_atom(history.marks, 1, "Wand"))
 
 
-def done(request: Errand) -> list:
+def done(request: Task) -> list:
     """The commands that a request comes to."""
     return list(request.run(lambda: False))
 

@@ -18,13 +18,13 @@ Sizes: V views, H W cells of the grid, n cells that are tried, B blocks of cells
 from dataclasses import dataclass
 
 import torch
-from jaxtyping import Bool, Float
+from jaxtyping import Bool
 from torch import Tensor
 from torch.nn import functional as F
 
-from langflash_core.geometry.cameras import invert_rigid, pictured, unproject
 from langflash_core.geometry.surfels import spans
 from langflash_core.geometry.vantage import from_the_middle, leading
+from langflash_core.rig.rig import Rig
 
 BEHIND, BEFORE = 0.12, 0.12
 """Log depth: how far behind and before another photo's surface a pixel still shows the same one."""
@@ -35,42 +35,34 @@ _BORDER = 2  # cells, at the border of a photo that leads, that take nothing ove
 _FINER = 2.0  # area that a pixel of the earlier photo covers over that of a later one which takes it over
 
 
-def owned(
-    depths: Float[Tensor, "V H W"],
-    viewmats: Float[Tensor, "V 4 4"],
-    Ks: Float[Tensor, "V 3 3"],
-    known: Bool[Tensor, "V H W"] | None = None,
-) -> Bool[Tensor, "V H W"]:
+def select_views(rig: Rig, known: Bool[Tensor, "V H W"] | None = None) -> Bool[Tensor, "V H W"]:
     """(V, H, W) bool: the cells of each photo that it covers itself.
 
     Args:
-        depths: (V, H, W) > 0. viewmats: (V, 4, 4). Ks: (V, 3, 3), pixels of the depth maps.
         known: (V, H, W) bool, the cells that may cover anything; None: all.
     """
-    known = torch.ones_like(depths, dtype=torch.bool) if known is None else known
-    if len(depths) == 1:
+    known = torch.ones_like(rig.depths, dtype=torch.bool) if known is None else known
+    if len(rig) == 1:
         return known
-    first = leading(depths, viewmats)
-    order = sorted(from_the_middle(depths, viewmats), key=lambda view: view not in first)
+    first = leading(rig.depths, rig.viewmats)
+    order = sorted(from_the_middle(rig.depths, rig.viewmats), key=lambda view: view not in first)
     keep, takers = torch.zeros_like(known), _takers(known, first)
-    logs, focals = depths.log().flatten(1), Ks[:, 0, 0]
-    for view in range(len(depths)):
-        points, normals = _surface(depths[view], viewmats[view], Ks[view])
+    for view in range(len(rig)):
+        points, normals = _surface(rig, view)
         finest, mine = torch.full_like(points[0], torch.inf), torch.zeros_like(points[0], dtype=torch.bool)
         others = order
-        if len(depths) > _ALL:
-            tried = _tried(depths.shape[1:])
-            some = points[:, tried], normals[:, tried]
-            others = _holders(view, *some, viewmats, Ks, focals, logs, takers, order, first)
+        if len(rig) > _ALL:
+            tried = _tried(rig.size)
+            others = _holders(view, points[:, tried], normals[:, tried], rig, takers, order, first)
         for other in others:
-            area = _covered_area(points, normals, viewmats[other], focals[other])
+            area = _covered_area(points, normals, rig, other)
             takes = _takes(area, finest, other in first)
             if other != view:
-                takes &= _same(points, viewmats[other], Ks[other], logs[other], takers[other])
+                takes &= _same(points, rig, other, takers[other])
             finest = torch.where(takes, area, finest)
             mine = takes if other == view else mine & ~takes
         keep[view] = mine.view_as(keep[view])
-    return filled(depths, viewmats, Ks, _closed(keep) & known, known)
+    return fill_uncovered(rig, _closed(keep) & known, known)
 
 
 def _takers(known: Tensor, first: list[int]) -> Tensor:
@@ -85,10 +77,8 @@ def _takers(known: Tensor, first: list[int]) -> Tensor:
     return takers
 
 
-def filled(
-    depths: Float[Tensor, "V H W"],
-    viewmats: Float[Tensor, "V 4 4"],
-    Ks: Float[Tensor, "V 3 3"],
+def fill_uncovered(
+    rig: Rig,
     keep: Bool[Tensor, "V H W"],
     known: Bool[Tensor, "V H W"],
     anything: Bool[Tensor, "V H W"] | None = None,
@@ -97,58 +87,48 @@ def filled(
     one's cells count as kept for those after it, so that many photos do not all fill one gap.
 
     Args:
-        depths, viewmats, Ks, anything: as `covered`. keep, known: (V, H, W) bool, as `owned`.
+        keep, known: (V, H, W) bool, as `select_views`. anything: as `find_covered`.
     """
-    bare, found = known & ~covered(depths, viewmats, Ks, keep, anything), keep.clone()
-    before = depths.new_zeros(3, 0)
-    for view in from_the_middle(depths, viewmats):
+    bare, found = known & ~find_covered(rig, keep, anything), keep.clone()
+    before = rig.depths.new_zeros(3, 0)
+    for view in from_the_middle(rig.depths, rig.viewmats):
         if not bool(bare[view].any()):
             continue
-        points, _ = _surface(depths[view], viewmats[view], Ks[view])
-        own = bare[view] & ~_hit(before, viewmats[view], Ks[view], (1 + _ABOUT) * depths[view])
+        own = bare[view] & ~_hit(before, rig, view, (1 + _ABOUT) * rig.depths[view])
         found[view] |= own
-        before = torch.cat((before, points[:, own.flatten()]), 1)
+        before = torch.cat((before, rig.points(view)[:, own.flatten()]), 1)
     return found
 
 
-def covered(
-    depths: Float[Tensor, "V H W"],
-    viewmats: Float[Tensor, "V 4 4"],
-    Ks: Float[Tensor, "V 3 3"],
-    keep: Bool[Tensor, "V H W"],
-    anything: Bool[Tensor, "V H W"] | None = None,
+def find_covered(
+    rig: Rig, keep: Bool[Tensor, "V H W"], anything: Bool[Tensor, "V H W"] | None = None
 ) -> Bool[Tensor, "V H W"]:
     """(V, H, W) bool: cells of each photo in which, or beside which, what is kept lies at about their depth
     or before it.
 
     Args:
-        depths, viewmats, Ks: as `owned`. keep: (V, H, W) bool. anything: (V, H, W) bool, cells that what lies
-            at any depth covers.
+        keep: (V, H, W) bool. anything: (V, H, W) bool, cells that what lies at any depth covers.
     """
-    height, width = depths.shape[1:]
-    order = _block_by_block(height, width)
-    points = [
-        _surface(*of)[0][:, order[kept.flatten()[order]]]
-        for *of, kept in zip(depths, viewmats, Ks, keep, strict=True)
-    ]
+    order = _block_by_block(*rig.size)
+    points = [rig.points(view)[:, order[kept.flatten()[order]]] for view, kept in enumerate(keep)]
     everything, found = _Blocks.of(torch.cat(points, 1)), []
-    farthest = (1 + _ABOUT) * depths
+    farthest = (1 + _ABOUT) * rig.depths
     if anything is not None:
         farthest = torch.where(anything, torch.inf, farthest)
-    for limit, viewmat, K in zip(farthest, viewmats, Ks, strict=True):
-        found.append(_hit(everything.before(viewmat, K, (height, width)), viewmat, K, limit))
+    for view, limit in enumerate(farthest):
+        some = everything.before(rig.viewmats[view], rig.Ks[view], rig.size)
+        found.append(_hit(some, rig, view, limit))
     return torch.stack(found)
 
 
-def _hit(points: Tensor, viewmat: Tensor, K: Tensor, farthest: Tensor) -> Tensor:
-    """(H, W) bool: cells in which, or beside which, one of the points (3, m) lies before `farthest`."""
-    height, width = farthest.shape
-    x, y, z = pictured(viewmat, K, points)
-    inside = (z > 0) & (x >= 0) & (x < width) & (y >= 0) & (y < height)
-    hit = torch.zeros(height * width)
-    place, z = (y.floor() * width + x.floor())[inside].long(), z[inside]
-    hit[place[z < farthest.flatten()[place]]] = 1
-    return F.max_pool2d(hit.view(1, 1, height, width), 3, 1, 1)[0, 0] > 0
+def _hit(points: Tensor, rig: Rig, view: int, farthest: Tensor) -> Tensor:
+    """(H, W) bool: cells of a photo in which, or beside which, one of the points (3, m) lies before
+    `farthest`."""
+    there = rig.project(points, view)
+    before = there.inside & (there.z < there.looked_up(farthest.flatten()))
+    hit = torch.zeros(farthest.numel())
+    hit[there.pixels[before]] = 1
+    return F.max_pool2d(hit.view(1, 1, *rig.size), 3, 1, 1)[0, 0] > 0
 
 
 @dataclass(frozen=True)
@@ -186,7 +166,7 @@ def _block_by_block(height: int, width: int) -> Tensor:
     return block.flatten().argsort(stable=True)
 
 
-def _tried(size: torch.Size) -> Tensor:
+def _tried(size: tuple[int, int]) -> Tensor:
     """Numbers (n,) of the cells of a grid that are tried."""
     cells = torch.arange(size[0] * size[1]).view(size[0], size[1])
     first = [min(_TRIED // 2, side - 1) for side in size]
@@ -194,32 +174,12 @@ def _tried(size: torch.Size) -> Tensor:
 
 
 def _holders(
-    view: int,
-    points: Tensor,
-    normals: Tensor,
-    viewmats: Tensor,
-    Ks: Tensor,
-    focals: Tensor,
-    logs: Tensor,
-    known: Tensor,
-    order: list[int],
-    first: list[int],
+    view: int, points: Tensor, normals: Tensor, rig: Rig, known: Tensor, order: list[int], first: list[int]
 ) -> list[int]:
     """The photos, in their order (leaders first), that have one of some points (3, n) of a view at some time,
     and itself."""
-    height, width = known.shape[1:]
-    centres = torch.stack([invert_rigid(own)[:3, 3] for own in viewmats])
-    towards = points - centres[..., None]  # (V, 3, n)
-    distances = (towards * towards).sum(1).sqrt().clamp_min(1e-9)
-    cosines = (towards * normals).sum(1).abs() / distances
-    areas = (distances / focals[:, None]) ** 2 / cosines.clamp_min(1e-3)
-    pos_c = viewmats[:, :3, :3] @ points + viewmats[:, :3, 3:]
-    ahead = pos_c[:, 2].clamp_min(1e-8)
-    x, y = (pos_c[:, a] / ahead * Ks[:, a, a, None] + Ks[:, a, 2, None] for a in (0, 1))
-    inside = (pos_c[:, 2] > 0) & (x >= 0) & (x < width) & (y >= 0) & (y < height)
-    place = torch.where(inside, y.floor() * width + x.floor(), 0.0).long()
-    gap = ahead.log() - logs.gather(1, place)
-    same = inside & known.flatten(1).gather(1, place) & (gap < BEHIND) & (gap > -BEFORE)
+    areas = _covered_area(points, normals, rig, slice(None))
+    same = _same(points, rig, slice(None), known)
     same[view] = True
     finest, held = torch.full_like(points[0], torch.inf), []
     for other in order:
@@ -236,32 +196,32 @@ def _takes(area: Tensor, finest: Tensor, begins: bool) -> Tensor:
     return takes if begins else takes & torch.isfinite(finest)
 
 
-def _surface(depths: Tensor, viewmat: Tensor, K: Tensor) -> tuple[Tensor, Tensor]:
+def _surface(rig: Rig, view: int) -> tuple[Tensor, Tensor]:
     """World points and unit normals (3, H*W)."""
-    pos_c = unproject(depths, K)
-    span_u, span_v = spans(pos_c, depths / K[0, 0])
+    pos_c = rig.in_camera(view)
+    span_u, span_v = spans(pos_c, rig.depths[view] / rig.Ks[view, 0, 0])
     normals = F.normalize(torch.linalg.cross(span_u, span_v), dim=-1)
-    pose = invert_rigid(viewmat)
-    points = pose[:3, :3] @ pos_c.flatten(0, 1).T + pose[:3, 3:]
-    return points, pose[:3, :3] @ normals.flatten(0, 1).T
+    return rig.in_world(pos_c.flatten(0, 1).T, view), rig.poses[view, :3, :3] @ normals.flatten(0, 1).T
 
 
-def _covered_area(points: Tensor, normals: Tensor, viewmat: Tensor, focal: Tensor) -> Tensor:
-    """(n,) of the surface, that one pixel of a photo covers; endless where it is seen edge-on."""
-    towards = points - invert_rigid(viewmat)[:3, 3:]
-    distances = (towards * towards).sum(0).sqrt().clamp_min(1e-9)  # `norm` over rows is ten times slower
-    cosines = (towards * normals).sum(0).abs() / distances
-    return (distances / focal) ** 2 / cosines.clamp_min(1e-3)
+def _covered_area(points: Tensor, normals: Tensor, rig: Rig, views: int | slice) -> Tensor:
+    """(..., n) of the surface, that one pixel of a photo covers, or of each of several; endless where it is
+    seen edge-on."""
+    towards = points - rig.poses[views, :3, 3:]
+    distances = (towards * towards).sum(-2).sqrt().clamp_min(1e-9)  # `norm` over rows is ten times slower
+    cosines = (towards * normals).sum(-2).abs() / distances
+    return (distances / rig.Ks[views, 0, 0, None]) ** 2 / cosines.clamp_min(1e-3)
 
 
-def _same(points: Tensor, viewmat: Tensor, K: Tensor, log_depths: Tensor, known: Tensor) -> Tensor:
-    """(n,) bool: another view sees these points as its surface."""
-    height, width = known.shape
-    x, y, z = pictured(viewmat, K, points)
-    inside = (z > 0) & (x >= 0) & (x < width) & (y >= 0) & (y < height)
-    place = torch.where(inside, y.floor() * width + x.floor(), 0.0).long()
-    gap = z.clamp_min(1e-9).log() - log_depths.index_select(0, place)
-    return inside & known.flatten()[place] & (gap < BEHIND) & (gap > -BEFORE)
+def _same(points: Tensor, rig: Rig, views: int | slice, known: Tensor) -> Tensor:
+    """(..., n) bool: another photo sees these points as its surface, or each of several does.
+
+    Args:
+        known: (..., H, W) bool, of those photos.
+    """
+    there = rig.project(points, views)
+    gap = there.z.clamp_min(1e-9).log() - there.looked_up(rig.log_depths[views].flatten(-2))
+    return there.inside & there.looked_up(known.flatten(-2)) & (gap < BEHIND) & (gap > -BEFORE)
 
 
 def _closed(keep: Tensor) -> Tensor:

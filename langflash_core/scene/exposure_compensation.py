@@ -37,7 +37,8 @@ from jaxtyping import Bool, Float, Int
 from torch import Tensor
 from torch.nn import functional as F
 
-from langflash_core.geometry.cameras import invert_rigid, pictured, transform, unproject
+from langflash_core.geometry.cameras import invert_rigid, transform, unproject
+from langflash_core.rig.rig import Rig
 
 GAIN_RANGE = (0.4, 2.5)
 """In sRGB values; almost three stops of exposure each way. What is farther off is drawn back into it."""
@@ -46,7 +47,7 @@ BLOCK = 4  # pixels a side
 EXPOSED = (0.03, 0.97)  # sRGB values that the sensor and the curve still tell apart
 AGREES = 0.05  # relative difference of depths that show one surface
 CONFIDENT = 1 / 3  # an expected error of a fifth of the depth and less
-PARTNERS = 5  # photos that each is compared with
+SOURCES = 5  # photos that each is compared with
 SIGMA = 0.05  # difference from which a pair speaks less and less
 _SIGMAS = (0.4, 0.4, 0.2, 0.2, 0.1, 0.1) + 10 * (SIGMA,)  # step after step
 ALIKE = 0.5
@@ -59,7 +60,7 @@ _COARSE = 4  # every so many blocks of a row and of a column tell which photos o
 
 
 @dataclass(frozen=True)
-class Light:
+class ExposureCompensation:
     """gains, offsets (V, 3): what brings each photo's red, green and blue to the light of all.
 
     Raises:
@@ -90,10 +91,10 @@ class Light:
         return low, (self.gains + self.offsets).amax(0).clamp_min(1)
 
     @property
-    def whole(self) -> "Light":
+    def whole(self) -> "ExposureCompensation":
         """The same light with all its span in [0, 1], so that nothing of a photo is clipped."""
         low, high = self.span
-        return Light(self.gains / (high - low), (self.offsets - low) / (high - low))
+        return ExposureCompensation(self.gains / (high - low), (self.offsets - low) / (high - low))
 
     def corrected(
         self, images: Float[Tensor, "*V 3 H W"], view: int | None = None
@@ -134,49 +135,36 @@ class Pairs:
     counted: Bool[Tensor, "E 3 P"]
 
 
-def photo_light(
-    images: Float[Tensor, "V 3 H W"],
-    depths: Float[Tensor, "V H W"],
-    confidences: Float[Tensor, "V H W"],
-    viewmats: Float[Tensor, "V 4 4"],
-    Ks: Float[Tensor, "V 3 3"],
-) -> Light:
+def compensate_exposure(rig: Rig) -> ExposureCompensation:
     """The gains and offsets that bring photos of one scene to one light.
 
     Args:
-        images: in [0, 1], sRGB values. depths: z > 0, of the viewmats' unit; others are left out, as is what
-            is not finite. confidences: in [0, 1]. viewmats: of photos whose place is known. Ks: pixels.
+        rig: with photos, whose places are known, and confidences. Depths of 0 and less are left out, as is
+            what is not finite.
 
     Returns:
         float64, on the CPU. Gains in `GAIN_RANGE`, offsets up to `LARGEST_OFFSET`. Exactly the identity for a
         photo that shares nothing with others.
     """
-    inputs = (values.detach().cpu().float() for values in (images, depths, confidences, viewmats, Ks))
     with torch.no_grad():
-        return light_of(compared(*inputs), len(images))
+        return solve_compensation(compared(rig.map(lambda values: values.detach().cpu().float())), len(rig))
 
 
-def compared(
-    images: Float[Tensor, "V 3 H W"],
-    depths: Float[Tensor, "V H W"],
-    confidences: Float[Tensor, "V H W"],
-    viewmats: Float[Tensor, "V 4 4"],
-    Ks: Float[Tensor, "V 3 3"],
-) -> Pairs:
-    """The pairs that `photo_light` compares, float32 in."""
-    num_views, height, width = depths.shape
-    if num_views < 2 or min(height, width) < BLOCK:
+def compared(rig: Rig) -> Pairs:
+    """The pairs that `compensate_exposure` compares, float32 in."""
+    num_views = len(rig)
+    if num_views < 2 or min(rig.size) < BLOCK:
         return _no_pairs()
-    blocks = _blocks(images, depths, confidences, viewmats, Ks)
+    blocks = _blocks(rig)
     shared = torch.zeros(num_views, num_views, dtype=torch.int64)
     for view in range(num_views):
-        _, agrees = _carried(blocks, blocks.points[:, blocks.coarse], viewmats, Ks, view)
+        _, agrees = _carried(blocks, blocks.points[:, blocks.coarse], rig, view)
         shared[:, view] = (agrees & _confident(blocks.own[..., blocks.coarse])).sum(-1)
-    firsts, seconds = partners(shared)
+    firsts, seconds = source_pairs(shared)
     parts = []
     for view in seconds.unique().tolist():
         chosen = firsts[seconds == view]
-        there, agrees = _carried(blocks, blocks.points[chosen], viewmats, Ks, view)
+        there, agrees = _carried(blocks, blocks.points[chosen], rig, view)
         own = blocks.own[chosen]
         exposed = (own[:, 3:6] > 0.999) & (there[:, 3:6] > 0.999)
         counted = exposed & (agrees & _confident(own))[:, None]
@@ -190,31 +178,30 @@ def _no_pairs() -> Pairs:
     return Pairs(views, views, colours, colours, colours.bool())
 
 
-def _blocks(images: Tensor, depths: Tensor, confidences: Tensor, viewmats: Tensor, Ks: Tensor) -> _Blocks:
-    exposed = ((images > EXPOSED[0]) & (images < EXPOSED[1])).float()
-    full = torch.cat((images, exposed, depths[:, None], confidences[:, None]), 1)
+def _blocks(rig: Rig) -> _Blocks:
+    assert rig.photos is not None and rig.confidences is not None, "whoever compares photos has them"
+    exposed = ((rig.photos > EXPOSED[0]) & (rig.photos < EXPOSED[1])).float()
+    full = torch.cat((rig.photos, exposed, rig.depths[:, None], rig.confidences[:, None]), 1)
     maps = F.avg_pool2d(full, BLOCK, stride=1)
     every = maps[..., ::BLOCK, ::BLOCK]
     lines, columns = every.shape[-2:]
     scale = torch.tensor([BLOCK, BLOCK, 1.0])[:, None]
-    points = transform(invert_rigid(viewmats), unproject(every[:, 6], Ks / scale).flatten(1, 2))
+    points = transform(invert_rigid(rig.viewmats), unproject(every[:, 6], rig.Ks / scale).flatten(1, 2))
     coarse = torch.arange(lines * columns).view(lines, columns)
     coarse = coarse[min(_COARSE // 2, lines - 1) :: _COARSE, min(_COARSE // 2, columns - 1) :: _COARSE]
     return _Blocks(maps, every.flatten(2), points, coarse.flatten())
 
 
-def _carried(
-    blocks: _Blocks, points: Tensor, viewmats: Tensor, Ks: Tensor, view: int
-) -> tuple[Tensor, Tensor]:
+def _carried(blocks: _Blocks, points: Tensor, rig: Rig, view: int) -> tuple[Tensor, Tensor]:
     """What `view` has (n, 8, p) where points (n, p, 3) lie in it, and whether (n, p) it sees these."""
-    x, y, z = pictured(viewmats[view], Ks[view], points.flatten(0, 1).T)
+    seen = rig.project(points.flatten(0, 1).T, view)
     lines, columns = blocks.maps.shape[-2:]
     ends = torch.tensor([max(columns - 1, 1), max(lines - 1, 1)])
-    places = 2 * (torch.stack((x, y), -1) - BLOCK / 2) / ends - 1
-    inside = (z > 0) & (places.abs() <= 1).all(-1)
+    places = 2 * (torch.stack((seen.x, seen.y), -1) - BLOCK / 2) / ends - 1
+    inside = seen.inside & (places.abs() <= 1).all(-1)
     places = torch.where(inside[:, None], places, 0.0)
     there = F.grid_sample(blocks.maps[view, None], places[None, None], align_corners=True)[0, :, 0]
-    agrees = inside & ((there[6] - z).abs() < AGREES * z) & (there[7] > CONFIDENT)
+    agrees = inside & ((there[6] - seen.z).abs() < AGREES * seen.z) & (there[7] > CONFIDENT)
     return there.unflatten(1, points.shape[:2]).transpose(0, 1), agrees.view(points.shape[:2])
 
 
@@ -223,8 +210,8 @@ def _confident(own: Tensor) -> Tensor:
     return own[:, 7] > CONFIDENT
 
 
-def partners(shared: Int[Tensor, "V V"]) -> tuple[Int[Tensor, " E"], Int[Tensor, " E"]]:
-    """Ordered pairs of photos to compare: each with the `PARTNERS` that it shares most with, and what else it
+def source_pairs(shared: Int[Tensor, "V V"]) -> tuple[Int[Tensor, " E"], Int[Tensor, " E"]]:
+    """Ordered pairs of photos to compare: each with the `SOURCES` that it shares most with, and what else it
     takes to connect what shares anything.
 
     Args:
@@ -235,7 +222,7 @@ def partners(shared: Int[Tensor, "V V"]) -> tuple[Int[Tensor, " E"], Int[Tensor,
     edges = [(i, j) for j in range(len(both)) for i in range(j) if both[i][j]]
     chosen = []
     for i, j in sorted(edges, key=lambda edge: (-both[edge[0]][edge[1]], edge)):
-        if min(degrees[i], degrees[j]) < PARTNERS or part[i] != part[j]:
+        if min(degrees[i], degrees[j]) < SOURCES or part[i] != part[j]:
             chosen += [(i, j), (j, i)]
             degrees[i], degrees[j] = degrees[i] + 1, degrees[j] + 1
             part = [part[i] if own == part[j] else own for own in part]
@@ -243,7 +230,7 @@ def partners(shared: Int[Tensor, "V V"]) -> tuple[Int[Tensor, " E"], Int[Tensor,
     return firsts, seconds
 
 
-def light_of(pairs: Pairs, num_views: int) -> Light:
+def solve_compensation(pairs: Pairs, num_views: int) -> ExposureCompensation:
     """The light of these pairs, found again without photos that no light makes alike."""
     light = _minimum(pairs, num_views)
     alike = _alike(pairs, light)
@@ -253,7 +240,7 @@ def light_of(pairs: Pairs, num_views: int) -> Light:
     return _minimum(Pairs(*kept), num_views)
 
 
-def _alike(pairs: Pairs, light: Light) -> Tensor:
+def _alike(pairs: Pairs, light: ExposureCompensation) -> Tensor:
     """(E,) photos of which most pairs differ by no more than 2 sigma."""
     first, second = (
         colours * light.gains[of][..., None] + light.offsets[of][..., None]
@@ -264,7 +251,7 @@ def _alike(pairs: Pairs, light: Light) -> Tensor:
     return near.sum((1, 2)) >= ALIKE * pairs.counted.sum((1, 2))
 
 
-def _minimum(pairs: Pairs, num_views: int) -> Light:
+def _minimum(pairs: Pairs, num_views: int) -> ExposureCompensation:
     """The minimum of the module's sum over these pairs, by linear least squares that are weighted again."""
     connected = _connected(pairs, num_views)
     gauge = torch.eye(num_views, dtype=torch.float64) - connected / connected.sum(-1, keepdim=True)
@@ -279,7 +266,7 @@ def _minimum(pairs: Pairs, num_views: int) -> Light:
         # 142815), of 96 photos and more.
         found = found + torch.stack([torch.linalg.solve(*own) for own in zip(normal, right, strict=True)])
     logs, offsets = _bounded(found.view(3, num_views, 2), connected).unbind(-1)
-    return Light(logs.exp().T.contiguous(), offsets.T.contiguous())
+    return ExposureCompensation(logs.exp().T.contiguous(), offsets.T.contiguous())
 
 
 def _normal_equations(pairs: Pairs, found: Tensor, sigma: float) -> tuple[Tensor, Tensor]:

@@ -1,7 +1,7 @@
 """What one photo shows and the others do not: rooms whose truth is known, seen from five places."""
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import pytest
 import torch
@@ -15,7 +15,8 @@ from langflash_core.geometry.cameras import (
     transform,
     unproject,
 )
-from langflash_core.scene.strangers import _CELL, _Look, strangers
+from langflash_core.rig.rig import Rig
+from langflash_core.scene.transients import _CELL, _Look, transient_masks
 
 WIDTH, HEIGHT = 96, 72
 WALL = 3.0
@@ -32,8 +33,11 @@ class Seen:
     Ks: Tensor
     things: Tensor  # (V, H, W) bool
 
+    def rig(self) -> Rig:
+        return Rig(self.viewmats, self.Ks, self.depths, photos=self.images)
+
     def found(self) -> Tensor:
-        return strangers(self.images, self.depths, self.viewmats, self.Ks)
+        return transient_masks(self.rig())
 
 
 def room(thing: tuple[float, ...], shown: tuple[bool, ...], kinds: tuple[int, ...] | None = None) -> Seen:
@@ -131,9 +135,8 @@ def test_photos_that_see_nothing_in_common_say_nothing():
 
 def test_a_picture_of_one_pixel():
     ones = torch.ones(4, 1, 1)
-    assert not strangers(
-        ones[:, None].expand(4, 3, 1, 1), ones, torch.eye(4).repeat(4, 1, 1), torch.eye(3).repeat(4, 1, 1)
-    ).any()
+    cameras = torch.eye(4).repeat(4, 1, 1), torch.eye(3).repeat(4, 1, 1)
+    assert not transient_masks(Rig(*cameras, ones, photos=ones[:, None].expand(4, 3, 1, 1))).any()
 
 
 def test_what_is_foreseen_is_what_a_plain_loop_finds():
@@ -142,8 +145,9 @@ def test_what_is_foreseen_is_what_a_plain_loop_finds():
     image, depths, viewmat, K = (v[0].double() for v in (seen.images, seen.depths, seen.viewmats, seen.Ks))
     image, depths = image[:, :24, :32], depths[:24, :32]
     other, size = seen.viewmats[1].double(), torch.Size((12, 16))
-    look = _Look.of(image, depths, viewmat, K)
-    said = look.foreseen(replace(look, viewmat=other))
+    both = torch.stack((viewmat, other)), K.expand(2, 3, 3), depths.expand(2, -1, -1)
+    rig = Rig(*both, photos=image.expand(2, -1, -1, -1))
+    said = _Look.of(rig, 0).foreseen(_Look.of(rig, 1))
     points = transform(other @ invert_rigid(viewmat), unproject(depths, K).flatten(0, 1))
     cells: dict[tuple[int, int], list[tuple[float, int]]] = {}
     for number, ((x, y), z) in enumerate(

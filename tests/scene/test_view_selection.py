@@ -10,17 +10,24 @@ from torch import Tensor
 
 from langflash_core.geometry.cameras import intrinsics_from_fov, invert_rigid, rays, transform, unproject
 from langflash_core.geometry.vantage import from_the_middle, leading
-from langflash_core.scene import ownership
-from langflash_core.scene.ownership import (
-    BEFORE,
-    BEHIND,
-    covered,
-    filled,
-    owned,
-)
+from langflash_core.rig.rig import Rig
+from langflash_core.scene import view_selection
+from langflash_core.scene.view_selection import BEFORE, BEHIND
 
 HEIGHT, WIDTH = 24, 32
 WALL = (0.0, 0.0, 1.0), 3.0  # n x = d, in the world
+
+
+def select_views(depths: Tensor, viewmats: Tensor, Ks: Tensor, *known: Tensor) -> Tensor:
+    return view_selection.select_views(Rig(viewmats, Ks, depths), *known)
+
+
+def find_covered(depths: Tensor, viewmats: Tensor, Ks: Tensor, keep: Tensor) -> Tensor:
+    return view_selection.find_covered(Rig(viewmats, Ks, depths), keep)
+
+
+def fill_uncovered(depths: Tensor, viewmats: Tensor, Ks: Tensor, keep: Tensor, known: Tensor) -> Tensor:
+    return view_selection.fill_uncovered(Rig(viewmats, Ks, depths), keep, known)
 
 
 def camera(
@@ -79,12 +86,12 @@ def without_tips(cells: Tensor) -> Tensor:
 
 
 def test_one_photo_owns_all():
-    assert owned(*seen([camera()])).all()
+    assert select_views(*seen([camera()])).all()
 
 
 @pytest.mark.parametrize("views", [2, 3, 5])
 def test_of_equal_photos_the_first_keeps_all(views):
-    keep = owned(*seen([camera()] * views))
+    keep = select_views(*seen([camera()] * views))
     assert keep[0].all() and not keep[1:].any()
 
 
@@ -92,7 +99,7 @@ def test_of_equal_photos_the_first_keeps_all(views):
 def test_the_later_one_keeps_what_the_earlier_does_not_see(turn):
     """And goes on by a cell beyond, so that no seam opens; the border itself may be a cell off."""
     given = seen([camera(), camera(turn=(turn, 0.0))])
-    keep = owned(*given)
+    keep = select_views(*given)
     unseen = ~inside(*given, view=1, other=0)
     assert keep[0].all()
     assert unseen.any() and not unseen.all()
@@ -107,7 +114,7 @@ def test_the_finer_one_wins_from_twice_the_area_on(earlier, nearer, wins):
     narrow lens: towards the sides both see the wall more from aside, by cosines above .95."""
     near, far = camera((0.0, 0.0, 3 - 3 / nearer)), camera()
     given = seen([near, far] if earlier else [far, near], fov=20)
-    keep = owned(*given)
+    keep = select_views(*given)
     near_at, far_at = (0, 1) if earlier else (1, 0)
     common = inside(*given, view=far_at, other=near_at, margin=1)
     assert keep[near_at].all() == (earlier or wins)
@@ -120,8 +127,8 @@ def test_the_border_of_a_photo_takes_nothing_over(turns, monkeypatch):
     """Of more than two: where another photo's picture ends both stay, that no crack opens between them."""
     given = seen([camera(turn=(turn, 0.0)) for turn in turns])
     everybody_leads(monkeypatch)
-    monkeypatch.setattr(ownership, "_closed", lambda cells: cells)
-    left, border = ~owned(*given), ownership._BORDER if len(turns) > 2 else 0
+    monkeypatch.setattr(view_selection, "_closed", lambda cells: cells)
+    left, border = ~select_views(*given), view_selection._BORDER if len(turns) > 2 else 0
 
     def within(view: int, margin: float) -> Tensor:
         """Cells that lie in another picture, so far from its border."""
@@ -138,15 +145,15 @@ def test_one_that_does_not_lead_takes_over_up_to_its_border(leads, monkeypatch):
     """Of frames a finger apart each would keep its own border else, where the next one takes it."""
     far, near = camera(), camera((0.0, 0.0, 3 - 3 / 2.2))
     given = seen([far, near, far], fov=20)
-    monkeypatch.setattr(ownership, "leading", lambda *of: [0, 1] if leads else [0])
-    monkeypatch.setattr(ownership, "_closed", lambda cells: cells)
-    border = inside(*given, view=0, other=1) & ~inside(*given, view=0, other=1, margin=ownership._BORDER)
-    assert border.any() and (owned(*given)[0][border] == leads).all()
+    monkeypatch.setattr(view_selection, "leading", lambda *of: [0, 1] if leads else [0])
+    monkeypatch.setattr(view_selection, "_closed", lambda cells: cells)
+    border = inside(*given, view=0, other=1) & ~inside(*given, view=0, other=1, margin=view_selection._BORDER)
+    assert border.any() and (select_views(*given)[0][border] == leads).all()
 
 
 def test_a_wall_seen_from_aside_is_left_to_the_photo_that_faces_it():
     given = seen([camera((-6.0, 0.0, 1.0), turn=(1.25, 0.0)), camera()])
-    keep = owned(*given)
+    keep = select_views(*given)
     common = inside(*given, view=0, other=1, margin=1)
     assert common.sum() > 30 and not keep[0][~grown(~common, 2)].any() and keep[1].all()
 
@@ -156,7 +163,7 @@ def test_what_another_photo_cannot_see_is_kept():
     screen = torch.full((HEIGHT, WIDTH), 3.0)
     screen[:, 10:22] = 1.0
     depths = torch.stack((screen, torch.full((HEIGHT, WIDTH), 3.0)))
-    keep = owned(depths, torch.eye(4).repeat(2, 1, 1), lens(2))
+    keep = select_views(depths, torch.eye(4).repeat(2, 1, 1), lens(2))
     assert keep[0].all() and keep[1][:, 10:22].all()
     assert not keep[1][:, :9].any() and not keep[1][:, 23:].any()
 
@@ -165,7 +172,7 @@ def test_what_another_photo_cannot_see_is_kept():
 def test_surfaces_are_the_same_within_what_depths_err(gap):
     """gap: log depth by which the later photo's wall lies behind the earlier's."""
     depths = torch.tensor([0.0, gap]).exp()[:, None, None].expand(2, HEIGHT, WIDTH) * 3
-    keep = owned(depths, torch.eye(4).repeat(2, 1, 1), lens(2))
+    keep = select_views(depths, torch.eye(4).repeat(2, 1, 1), lens(2))
     assert keep[0].all() and keep[1].all() == (not -BEFORE < gap < BEHIND)
 
 
@@ -176,7 +183,7 @@ def test_photos_do_not_leave_a_surface_to_each_other():
     views = [camera((0.0, 0.0, 3 - 3 * share**0.5)) for share in (1.0, 1.0, 1.0, 0.62, 0.38)]
     given = seen(views, fov=20)
     assert from_the_middle(given[0], given[1]) == [0, 1, 2, 3, 4]
-    keep = owned(*given)
+    keep = select_views(*given)
     assert keep[4].all()
     common = inside(*given, view=0, other=4, margin=1)
     assert not keep[0][~grown(~common, 2)].any() and keep[0][~inside(*given, view=0, other=3)].all()
@@ -191,17 +198,17 @@ def test_of_many_photos_those_that_lead_begin_surfaces():
     depths = torch.where(wrong, 0.85 * depths, depths)
     first = leading(depths, viewmats)
     assert len(first) in (2, 3)
-    keep = owned(depths, viewmats, Ks)
+    keep = select_views(depths, viewmats, Ks)
     kept = {view for view in range(12) if bool((keep & wrong)[view].any())}
     assert kept and kept <= set(first)
-    assert covered(depths, viewmats, Ks, keep).all()
+    assert find_covered(depths, viewmats, Ks, keep).all()
 
 
 @pytest.mark.parametrize("views", [2, 5])
 def test_a_gap_that_all_see_is_filled_by_the_first(views):
     """And by none again: 128 photos that each filled it made 3.6 times the Gaussians of 64."""
     given = seen([camera()] * views)
-    found = filled(*given, keep=torch.zeros_like(given[0], dtype=torch.bool), known=given[0] > 0)
+    found = fill_uncovered(*given, keep=torch.zeros_like(given[0], dtype=torch.bool), known=given[0] > 0)
     assert found[0].all() and not found[1:].any()
 
 
@@ -209,7 +216,7 @@ def test_what_lies_before_what_fills_a_gap_fills_it_too():
     """A fifth farther is about the same depth, more is another surface."""
     depths = torch.tensor([1.0, 1.19, 0.8])[:, None, None].expand(3, HEIGHT, WIDTH) * 3
     nothing = torch.zeros_like(depths, dtype=torch.bool)
-    found = filled(depths, torch.eye(4).repeat(3, 1, 1), lens(3), nothing, ~nothing)
+    found = fill_uncovered(depths, torch.eye(4).repeat(3, 1, 1), lens(3), nothing, ~nothing)
     assert found[0].all() and not found[1].any() and found[2].all()
 
 
@@ -221,15 +228,15 @@ def test_after_gaps_are_filled_nothing_that_is_known_is_bare(seed):
     drawn = torch.rand(given[0].shape, generator=torch.Generator().manual_seed(seed))
     keep, known = torch.zeros_like(drawn, dtype=torch.bool), drawn < 0.9
     keep[::2, :, : WIDTH // 2] = True
-    found = filled(*given, keep, known)
+    found = fill_uncovered(*given, keep, known)
     assert (found & keep).equal(keep) and not (found & ~keep & ~known).any()
-    assert not (known & ~covered(*given, found)).any()
-    assert (found & ~keep).sum() < (known & ~covered(*given, keep)).sum()
+    assert not (known & ~find_covered(*given, found)).any()
+    assert (found & ~keep).sum() < (known & ~find_covered(*given, keep)).sum()
 
 
 def everybody_leads(monkeypatch) -> None:
     """What others leave bare is filled then by nobody, who is asked by other bounds."""
-    monkeypatch.setattr(ownership, "leading", lambda depths, viewmats: [*range(len(depths))])
+    monkeypatch.setattr(view_selection, "leading", lambda depths, viewmats: [*range(len(depths))])
 
 
 def drawn_views(seed: int, count: int) -> list[Tensor]:
@@ -247,9 +254,9 @@ def test_no_surface_that_somebody_sees_is_left_without_an_owner(seed, count, mon
     narrower than that: the ends of wedges, lines along a picture's edge."""
     given = seen(drawn_views(seed, count), [WALL, ((0.9, 0.1, 0.42), 1.9)][: 1 + seed % 2])
     everybody_leads(monkeypatch)
-    keep = owned(*given)
-    monkeypatch.setattr(ownership, "_closed", lambda cells: cells)
-    asked = owned(*given)
+    keep = select_views(*given)
+    monkeypatch.setattr(view_selection, "_closed", lambda cells: cells)
+    asked = select_views(*given)
     assert not without_owner(asked, *given).any()
     crumbs = asked & ~keep
     assert all(
@@ -278,7 +285,7 @@ def without_owner(keep: Tensor, depths: Tensor, viewmats: Tensor, Ks: Tensor) ->
     return ~found
 
 
-def plain_owned(depths: np.ndarray, viewmats: np.ndarray, Ks: np.ndarray) -> np.ndarray:
+def plain_selected(depths: np.ndarray, viewmats: np.ndarray, Ks: np.ndarray) -> np.ndarray:
     """The rule point by point, before crumbs go and borders grow."""
     return np.array(
         [
@@ -370,22 +377,24 @@ def test_it_agrees_with_its_twin_cell_by_cell(seed, monkeypatch):
     generator = torch.Generator().manual_seed(seed)
     depths = depths.double() * torch.exp(0.03 * torch.randn(depths.shape, generator=generator).double())
     given = (depths, viewmats.double(), Ks.double())
-    expected = np.array([plain_closed(keep) for keep in plain_owned(*(values.numpy() for values in given))])
+    expected = np.array(
+        [plain_closed(keep) for keep in plain_selected(*(values.numpy() for values in given))]
+    )
     assert 0.2 < expected.mean() < 0.95
     everybody_leads(monkeypatch)
-    assert np.array_equal(owned(*given).numpy(), expected)
+    assert np.array_equal(select_views(*given).numpy(), expected)
 
 
 def test_a_camera_that_sees_nothing_of_the_others_and_points_behind():
     away = camera(turn=(math.pi, 0.0))
     given = seen([camera(), away], [WALL, ((0.0, 0.0, -1.0), 3.0)])
-    assert owned(*given).all()
+    assert select_views(*given).all()
 
 
 def test_depths_of_nobodys_making_do_not_raise():
     depths = torch.exp(3 * torch.randn(3, HEIGHT, WIDTH, generator=torch.Generator().manual_seed(0)))
     depths[0, 0, 0], depths[1, 5, 5] = 1e-6, 1e6
-    keep = owned(depths, torch.stack(drawn_views(1, 3)), lens(3))
+    keep = select_views(depths, torch.stack(drawn_views(1, 3)), lens(3))
     assert keep.shape == depths.shape and keep.dtype == torch.bool
 
 
@@ -410,25 +419,25 @@ def test_of_many_photos_few_are_compared_cell_by_cell(monkeypatch):
     """Nearly the same cells as where all are compared with all; no surface loses its cover."""
     depths, viewmats, Ks = many(14)
     looked_at = []
-    same = ownership._same
-    monkeypatch.setattr(ownership, "_same", lambda *of: looked_at.append(of) or same(*of))
-    some = owned(depths, viewmats, Ks)
+    same = view_selection._same
+    monkeypatch.setattr(view_selection, "_same", lambda *of: looked_at.append(of) or same(*of))
+    some = select_views(depths, viewmats, Ks)
     few = len(looked_at)
-    monkeypatch.setattr(ownership, "_ALL", 100)
-    every = owned(depths, viewmats, Ks)
+    monkeypatch.setattr(view_selection, "_ALL", 100)
+    every = select_views(depths, viewmats, Ks)
     assert few < 0.7 * (len(looked_at) - few) and len(looked_at) - few == 14 * 13
     # Of 40 x 48 cells 30 are tried; of 224 x 224 they are 784, and .999 the same in a room of 32 photos.
     assert (some == every).float().mean() > 0.96
-    assert covered(depths, viewmats, Ks, some).all()
+    assert find_covered(depths, viewmats, Ks, some).all()
 
 
 def test_up_to_eight_photos_all_are_compared():
     """Exactly as one by one: the choice at every eighth cell has no part in it."""
     depths, viewmats, Ks = many(8)
-    few = owned(depths, viewmats, Ks)
+    few = select_views(depths, viewmats, Ks)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(ownership, "_holders", None)
-        assert torch.equal(owned(depths, viewmats, Ks), few)
+        patch.setattr(view_selection, "_holders", None)
+        assert torch.equal(select_views(depths, viewmats, Ks), few)
 
 
 @pytest.mark.parametrize("share", [0.0, 0.02, 0.5])
@@ -436,8 +445,8 @@ def test_blocks_beside_a_picture_cover_nothing(share):
     """The same as with all points, however few are kept."""
     depths, viewmats, Ks = many(6)
     keep = torch.rand(depths.shape, generator=torch.Generator().manual_seed(1)) < share
-    found = covered(depths, viewmats, Ks, keep)
+    found = find_covered(depths, viewmats, Ks, keep)
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(ownership._Blocks, "before", lambda blocks, *_: blocks.points.flatten(1))
-        assert torch.equal(covered(depths, viewmats, Ks, keep), found)
+        patch.setattr(view_selection._Blocks, "before", lambda blocks, *_: blocks.points.flatten(1))
+        assert torch.equal(find_covered(depths, viewmats, Ks, keep), found)
     assert bool(found.any()) == (share > 0)

@@ -16,7 +16,7 @@ LONGEST_REFINEMENT = 3600  # seconds
 
 
 @dataclass(frozen=True)
-class Wishes:
+class Options:
     """Fields as the arguments of `pipeline.reconstruct`."""
 
     photos: Sequence[Path | str]
@@ -35,7 +35,7 @@ class Wishes:
     viewmats: Float[Tensor, "V 4 4"] | None = None
     keep: Path | None = None
 
-    def settled(self) -> "Wishes":
+    def settled(self) -> "Options":
         """The same with the device that there is, once all was checked that can be before a photo is read.
 
         Raises:

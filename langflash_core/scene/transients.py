@@ -25,12 +25,13 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 import torch
-from jaxtyping import Bool, Float
+from jaxtyping import Bool
 from torch import Tensor
 from torch.nn import functional as F
 
-from langflash_core.geometry.cameras import invert_rigid, pictured, unproject
-from langflash_core.scene.consistency import witnesses
+from langflash_core.rig.neighbours import neighbours
+from langflash_core.rig.projected import Projected, project_points
+from langflash_core.rig.rig import Rig
 
 LEAST = 3
 """Photos, from which on two may contradict one."""
@@ -50,34 +51,26 @@ _NEAR, _LIKE = 3, 0.06  # pixels a side of the window, and sRGB, within which a 
 _FOUND = 0.5  # of a region's pixels, at one depth
 _DENIES = 0.5  # of a region, that another photo must look at or through to deny it
 _IN_VIEW = 0.3  # of a region, that another photo must have before it to say anything
-_LEAST_DEPTH = 1e-6  # unit of the depths
 _SQUARE = np.ones((3, 3), bool)
 _DEPTHS = (*(k / 20 for k in range(-12, 13)), 0.8, 1.1, 1.6, 2.5)
 """Log depths, by which a region is moved: what is seen through a window or in a mirror is far."""
 
 
-def strangers(
-    images: Float[Tensor, "V 3 H W"],
-    depths: Float[Tensor, "V H W"],
-    viewmats: Float[Tensor, "V 4 4"],
-    Ks: Float[Tensor, "V 3 3"],
-) -> Bool[Tensor, "V H W"]:
+def transient_masks(rig: Rig) -> Bool[Tensor, "V H W"]:
     """Pixels of each photo that the others contradict.
 
     Args:
-        images: in [0, 1], in one light. depths: z > 0, finite. viewmats: of photos whose place is known. Ks:
-            pixels.
+        rig: with photos in one light, whose places are known; depths are finite.
 
     Returns:
         Nothing of fewer than `LEAST` photos, and nothing of what fewer than two others foresee.
     """
-    found = torch.zeros_like(depths, dtype=torch.bool)
-    if len(images) < LEAST or min(depths.shape[1:]) < _CELL * _WINDOW:
+    found = torch.zeros_like(rig.depths, dtype=torch.bool)
+    if len(rig) < LEAST or min(rig.size) < _CELL * _WINDOW:
         return found
-    looks = [_Look.of(*own) for own in zip(images, depths, viewmats, Ks, strict=True)]
+    looks = [_Look.of(rig, view) for view in range(len(rig))]
     for view, own in enumerate(looks):
-        size = (depths.shape[1], depths.shape[2])
-        others = [looks[other] for other in witnesses(view, own.points().T, viewmats, Ks, size, _ASKED)]
+        others = [looks[other] for other in neighbours(rig, view, "sight", _ASKED)]
         if len(others) < _VOTES:
             continue
         said = _Foreseen.together([other.foreseen(own) for other in others])
@@ -91,58 +84,53 @@ def strangers(
 
 @dataclass(frozen=True)
 class _Look:
-    """A photo: image (3, H, W), depths (H, W), camera; and of its cells depth (h, w), the nearest in each,
-    colour, and least and most (3, h, w) within `_AROUND` of them."""
+    """A photo of a rig: image (3, H, W), points (3, H*W) in the world; and of its cells depth (h, w), the
+    nearest in each, colour, and least and most (3, h, w) within `_AROUND` of them."""
 
+    rig: Rig
+    view: int
     image: Tensor
-    depths: Tensor
-    viewmat: Tensor
-    K: Tensor
+    points: Tensor
     depth: Tensor
     colour: Tensor
     least: Tensor
     most: Tensor
 
     @staticmethod
-    def of(image: Tensor, depths: Tensor, viewmat: Tensor, K: Tensor) -> "_Look":
-        height, width = depths.shape
+    def of(rig: Rig, view: int) -> "_Look":
+        assert rig.photos is not None, "whoever seeks transients looks at them"
+        (height, width), image = rig.size, rig.photos[view]
         whole = (slice(None), slice(height // _CELL * _CELL), slice(width // _CELL * _CELL))
         cut, side, reach = image[whole], _AROUND * _CELL, (_AROUND - 1) // 2 * _CELL
         least, most = (
             sign * F.max_pool2d(F.pad(sign * cut, (reach,) * 4, value=-torch.inf), side, _CELL)
             for sign in (-1, 1)
         )
-        depth = -F.max_pool2d(-depths[None][whole], _CELL)[0]
-        return _Look(image, depths, viewmat, K, depth, F.avg_pool2d(cut, _CELL), least, most)
+        depth = -F.max_pool2d(-rig.depths[view][None][whole], _CELL)[0]
+        return _Look(rig, view, image, rig.points(view), depth, F.avg_pool2d(cut, _CELL), least, most)
 
     @property
     def centre(self) -> Tensor:
         """(3, 1) world."""
-        return invert_rigid(self.viewmat)[:3, 3:]
-
-    def points(self, pixels: Tensor | slice = slice(None)) -> Tensor:
-        """(3, n) world, of some pixels by number."""
-        pose = invert_rigid(self.viewmat)
-        return pose[:3, :3] @ unproject(self.depths, self.K).flatten(0, 1)[pixels].T + pose[:3, 3:]
+        return self.rig.poses[self.view, :3, 3:]
 
     def pixels(self, cells: Tensor) -> Tensor:
         """Numbers (n,) of a pixel in each of some cells (h, w) bool."""
         rows, columns = cells.nonzero().T
         return (rows * _CELL + _CELL // 2) * self.image.shape[2] + columns * _CELL + _CELL // 2
 
-    def before(self, points: Tensor) -> tuple[Tensor, Tensor, Tensor, Tensor]:
-        """Rows and columns (n,) of the pixels where points (3, n) of the world are seen, z, and whether they
-        are."""
-        x, y, z = pictured(self.viewmat, self.K, points)
+    def before(self, points: Tensor) -> tuple[Tensor, Tensor, Projected]:
+        """Rows and columns (n,) of the pixels where points (3, n) of the world are seen, in whole cells."""
         height, width = (_CELL * side for side in self.depth.shape)
-        inside = (z > _LEAST_DEPTH) & (x >= 0) & (y >= 0) & (x < width) & (y < height)
-        return torch.where(inside, y, 0.0).long(), torch.where(inside, x, 0.0).long(), z, inside
+        camera = self.rig.viewmats[self.view], self.rig.Ks[self.view]
+        there = project_points(points, *camera, (height, width))
+        return there.pixels // width, there.pixels % width, there
 
     def foreseen(self, other: "_Look") -> "_Foreseen":
         """What this photo says that another one shows."""
-        rows, columns, z, inside = other.before(self.points())
-        (height, width), some = other.depth.shape, inside.nonzero()[:, 0]
-        places, z = (rows // _CELL * width + columns // _CELL)[some], z[some]
+        rows, columns, there = other.before(self.points)
+        (height, width), some = other.depth.shape, there.inside.nonzero()[:, 0]
+        places, z = (rows // _CELL * width + columns // _CELL)[some], there.z[some]
         nearest = z.new_full((height * width,), torch.inf).scatter_reduce(0, places, z, "amin")
         front = z < (1 + _ALIKE) * nearest[places]
         some, places = some[front], places[front]
@@ -155,22 +143,22 @@ class _Look:
 
     def faces(self, other: "_Look") -> Tensor:
         """(h, w) bool: cells of another photo whose surface this one sees or looks through."""
-        points = other.points(other.pixels(torch.ones_like(other.depth, dtype=torch.bool)))
-        rows, columns, z, inside = self.before(points)
-        return (inside & (z < math.exp(_THROUGH) * self.depth[rows // _CELL, columns // _CELL])).view_as(
-            other.depth
-        )
+        every = other.pixels(torch.ones_like(other.depth, dtype=torch.bool))
+        rows, columns, there = self.before(other.points[:, every])
+        nearer = there.z < math.exp(_THROUGH) * self.depth[rows // _CELL, columns // _CELL]
+        return (there.inside & nearer).view_as(other.depth)
 
     def shows(self, other: "_Look", pixels: Tensor) -> float:
         """The largest share of another photo's pixels (n,) that this one shows, wherever along their rays all
         of them lie; NaN where it has them nowhere before it."""
-        rays, colours = other.points(pixels) - other.centre, other.image.flatten(1)[:, pixels]
+        rays, colours = other.points[:, pixels] - other.centre, other.image.flatten(1)[:, pixels]
         least, most = (
             sign * F.max_pool2d(sign * self.image, _NEAR, 1, _NEAR // 2).flatten(1) for sign in (-1, 1)
         )
         best = math.nan
         for change in _DEPTHS:
-            rows, columns, _, inside = self.before(other.centre + math.exp(change) * rays)
+            rows, columns, there = self.before(other.centre + math.exp(change) * rays)
+            inside = there.inside
             if float(inside.float().mean()) < _IN_VIEW:
                 continue
             places = (rows * self.image.shape[2] + columns)[inside]
@@ -249,7 +237,7 @@ def _elsewhere(seed: Tensor, own: _Look, others: list[_Look], faced: Tensor) -> 
 
 def _grown(seeds: Tensor, may: Tensor) -> Tensor:
     """(h, w) bool: seeds, what goes on from there, holes and a margin."""
-    import scipy.ndimage  # a tenth of what is imported for a scene, where few have strangers
+    import scipy.ndimage  # a tenth of what is imported for a scene, where few have transients
 
     grown = scipy.ndimage.binary_dilation(
         seeds.cpu().numpy(), _SQUARE, _FARTHEST, (may | seeds).cpu().numpy()

@@ -1,0 +1,298 @@
+"""Numbers that stages decide by: one frozen record a stage, each number with its unit and its reason.
+
+A stage takes its record as `settings`, so that a trial can change one number; products take the defaults.
+"""
+
+from dataclasses import dataclass
+
+
+@dataclass(frozen=True)
+class Agreement:
+    """Depth maps that are bent and blended until they agree (`network.stereo.agreement`)."""
+
+    knots: int = 5
+    """Of a correction, a side: slower than that no map errs."""
+    step: int = 4
+    """Every fourth pixel of a row and of a column is compared for the correction."""
+    iterations: int = 3
+    """Of least squares, each with the weights of what is left of the one before."""
+    scale: float = 0.04
+    """Relative difference from which a pixel speaks less and less (Geman-McClure)."""
+    independent: int = 200
+    """Pixels go together: all compared ones count as this many a view."""
+    expected: float = 0.075
+    """Log depth, standard deviation of a knot where nothing is compared."""
+    bend: float = 0.06
+    """Log depth, standard deviation of a knot against its neighbour."""
+    same: float = 0.06
+    """Maps that differ by less, relatively, show one surface."""
+
+
+AGREEMENT = Agreement()
+
+
+@dataclass(frozen=True)
+class Registration:
+    """Depth from what optical flow finds shifted (`network.stereo.registration`)."""
+
+    largest: int = 3
+    """Times the maps' size, at which photos are compared."""
+    smallest: int = 12
+    """Pixels of a photo's side, with which flow works."""
+    rounds: tuple[int, int] = (2, 4)
+    """Neighbours that a view is compared with, round by round, each from where the one before ended: of many
+    photos; a second photo alone says all it can at once. On two rendered walks the median error of depth fell
+    from 2.6 % to 1.2 (2), 1.0 (4), 1.0 (2 and 2), .84 (2 and 4), .80 % (4 and 4)."""
+    flow_error: float = 0.7
+    """Pixels of the photo, standard deviation of a shift."""
+    there_and_back: float = 0.7
+    """Pixels by which the way back may miss."""
+    brightness: float = 10.0
+    """Of 255, difference that is still the same."""
+    chance: float = 0.03
+    """Mean certainty of what a neighbour sees, below which it shows something else."""
+    texture: float = 2.0
+    """Squared grey values a pixel, of gradient along a shift at which flow is half as sure."""
+    flat: float = 0.1
+    """Squared grey values a pixel, of that gradient, which are noise."""
+    one_shift: int = 10
+    """Cells of the maps: flow finds one shift for 16 x 16 pixels and more."""
+    farthest: float = 0.3
+    """Log depth that a match may ask for."""
+    expected: float = 0.15
+    """Log depth, what the maps may be off."""
+    alike: int = 50
+    """Cells that are off together: errors of the maps are slow."""
+    stiff: float = 3000.0
+    """1 over the square of a log depth: stiffness of the correction from a cell to the next."""
+    jump: float = 0.03
+    """Log depth between cells from which it is cut."""
+    edge: float = 5.0
+    """Of 255, difference of brightness between cells from which it is cut."""
+    across: float = 0.02
+    """What is left of it there: most edges are drawn on one surface."""
+    iterations: int = 250
+    """Of conjugate gradients, at most."""
+    at_hand: int = 64
+    """Pictures of one size that are kept."""
+    margin: float = 1.0
+    """Pixels at the border that say nothing."""
+
+
+REGISTRATION = Registration()
+
+
+@dataclass(frozen=True)
+class PlaneSweep:
+    """Things that depth maps have missed (`network.stereo.planesweep`)."""
+
+    planes: int = 48
+    """Hypotheses in equal steps of inverse depth."""
+    nearer: float = 2.0
+    """Times nearer than all but a hundredth of the map, where planes begin."""
+    reach: int = 2
+    """Pixels: windows of 5 x 5."""
+    noise: float = 5.0
+    """Grey values, standard deviation: windows with less show nothing."""
+    votes: int = 2
+    """Neighbours that must show it: others may have it hidden."""
+    alike: float = 0.7
+    """Correlation of windows that show one thing."""
+    better: float = 0.25
+    """Of correlation, than at the map's depth."""
+    other: float = 0.1
+    """Log depth: nearer to the map registration finds it."""
+    same: float = 0.05
+    """Log depth within which a neighbour says the same."""
+    error: float = 0.02
+    """Log depth, of what is found."""
+    smoothing: Registration = REGISTRATION
+    """Over what corrections are carried."""
+
+
+PLANE_SWEEP = PlaneSweep()
+
+
+@dataclass(frozen=True)
+class Flattening:
+    """Surfaces that are flat as far as anybody can tell (`network.stereo.planes`)."""
+
+    radii: tuple[int, int, int, int] = (2, 4, 8, 14)
+    """Of the windows, in pixels of maps of half the size, where a token has 7: the largest is four tokens."""
+    share: float = 0.25
+    """Of the expected error, which is mostly of whole surfaces; as large are ripples."""
+    range: tuple[float, float] = (0.004, 0.015)
+    """Of what is a ripple, relative depth: more is a thing, or a bend."""
+    farthest: float = 2.5
+    """Ripples by which a pixel's own depth may differ from the plane."""
+
+
+FLATTENING = Flattening()
+
+
+@dataclass(frozen=True)
+class Sharpening:
+    """Edges of depth where the photo has them (`network.stereo.sharpening`)."""
+
+    reach: int = 12
+    """Pixels: as far as a map smears an edge, 16 pixels a token."""
+    rings: tuple[tuple[int, int], ...] = ((3, 6), (7, 9), (12, 12))
+    """Radius in pixels, places looked at."""
+    nearby: float = 12.0
+    """Pixels, standard deviation of what a place counts."""
+    flat: float = 0.01
+    """Log depth a pixel: a slope of this counts half."""
+    colour: float = 0.08
+    """Standard deviation of what is one colour, of 1."""
+    chroma: float = 1.5
+    """Hue counts more than light, which shadows change."""
+    least_gap: float = 0.15
+    """Log depth between the parts."""
+    parted: float = 4.5
+    """Gap in standard deviations within the parts; a slanted plane has 3.2."""
+    least_flat: float = 0.1
+    """Weight of a part below which nobody knows its depth."""
+    where: float = 1.5
+    """What the side of the slope counts beside the colours, where those say nothing."""
+    least_exponent: float = -20.0
+    """Numbers too small for a normal float are slow to add."""
+    floor: float = 0.02
+    """Weight of colours that say nothing."""
+
+
+SHARPENING = Sharpening()
+
+
+@dataclass(frozen=True)
+class Choice:
+    """Which photos a photo is compared with (`rig.neighbours`)."""
+
+    sources: int = 4
+    """Of each photo, by the angle."""
+    asked: int = 16
+    """Photos that are asked about one photo's points."""
+    tried: int = 67
+    """Points of a photo, of which one is looked for in the others."""
+    step: int = 8
+    """Pixels between sampled points."""
+    surface: float = 0.3
+    """Log depth by which the other map may differ and still show the point."""
+    full: float = 8.0
+    """Degrees between two rays, up to which worth grows."""
+    best: float = 9.0
+    """Degrees beyond which it falls,"""
+    fall: float = 8.0
+    """and by how many to 1 / e."""
+    apart: float = 4.0
+    """Degrees between two neighbours, from which on they say different things."""
+    enough: float = 0.15
+    """Worth that a point has from the start: what more of the same adds to it."""
+    least: float = 0.01
+    """Of gain a point, for a neighbour."""
+
+
+CHOICE = Choice()
+
+
+@dataclass(frozen=True)
+class Straightening:
+    """Monocular depth that matches straighten (`network.stereo.alignment`)."""
+
+    prior_error: float = 0.08
+    """Log-depth error that no smooth correction removes."""
+    cauchy: float = 2.0
+    """Standard deviations from which a match speaks less and less."""
+    iterations: int = 15
+    """Of least squares that are weighted again."""
+    limit: float = 1.0
+    """Log depth: a correction never exceeds a factor of e."""
+
+
+STRAIGHTENING = Straightening()
+
+
+@dataclass(frozen=True)
+class Graph:
+    """Relative poses of pairs brought together (`network.stereo.graph`)."""
+
+    sources: int = 4
+    """Of each photo, whose pairs are looked at."""
+    loop: float = 4.0
+    """Degrees within which the turns around a triangle must close to confirm its edges."""
+    robust: float = 3.0
+    """Sigmas from which an edge speaks less and less (Geman-McClure)."""
+    agrees: float = 40.0
+    """Square of the gap in sigmas (7 degrees of freedom) up to which an edge is kept."""
+    steps: int = 12
+    """Of Gauss and Newton, at most."""
+    damping: float = 1e-6
+    """Share of the diagonal: views that no edge reaches stay."""
+
+
+GRAPH = Graph()
+
+
+@dataclass(frozen=True)
+class Adjustment:
+    """All photos and lenses adjusted together (`network.stereo.adjustment`)."""
+
+    observations: tuple[int, int] = (150, 400)
+    """Of each view, in the first round and in the second: more change nothing but the time."""
+    sigma: float = 0.4
+    """Pixels at the working size, of a key point."""
+    agrees: float = 2.0
+    """Times the tolerance of pairs, within which matches join once poses are known."""
+    shared: float = 3.0
+    """Standard errors of a lens are so many times those of independent observations: errors of key points
+    depend on what they show, and go together."""
+    known: float = 0.03
+    """Standard error of a focal length, of itself, above which it is not taken."""
+    fields: tuple[float, float] = (20.0, 120.0)
+    """Degrees of the longer side: what photos of rooms are taken with."""
+    bend_doubt: float = 0.15
+    """Standard deviation expected of a bend: action cameras have as much."""
+    bend_sure: float = 3.0
+    """Standard errors from which a bend is one."""
+    bend_seen: float = 4.0
+    """Pixels at the working size by which a bend moves a photo's corner, at least: the focal length makes up
+    for three quarters of that, and key points are sure to the rest."""
+    steepest: float = 0.1
+    """Of a straight lens: what a bent one magnifies a photo's corner along the radius, at least."""
+
+
+ADJUSTMENT = Adjustment()
+
+
+@dataclass(frozen=True)
+class Pairing:
+    """Poses of pairs, and which photos tell a lens first (`network.stereo.poses`)."""
+
+    min_share: float = 0.25
+    """Of the matches, that must agree with a pose."""
+    max_depth_sigma: float = 0.2
+    """Log-depth error beyond which a triangulated match says too little."""
+    min_points: int = 10
+    """Matches needed to correct a map."""
+    few: int = 40
+    """Inliers among key points, below which dense matches are asked as well."""
+    first: int = 8
+    """Photos that tell the lens first."""
+    enough: int = 100
+    """Matches with one of them."""
+    other_lens: float = 0.05
+    """Change of a focal length, as a logarithm, from which pairs are looked at again."""
+    dense_cost: float = 2.75
+    """Cost from which dense matches are not believed: on validation rooms the wrong ones began at 2.8."""
+    checked: int = 4
+    """Pairs of known poses that are sought as well."""
+    bridges: int = 4
+    """Pairs that are asked, at most, to connect two parts: ten place no photo of four walks more."""
+    graph: Graph = GRAPH
+    """How the poses of pairs are brought together."""
+    adjustment: Adjustment = ADJUSTMENT
+    """How all photos are adjusted."""
+    straightening: Straightening = STRAIGHTENING
+    """How their depth maps are corrected."""
+
+
+PAIRING = Pairing()

@@ -1,0 +1,219 @@
+"""How much there is to understand on the way from photos to a scene, in a checkout, and another beside it:
+
+    python -m tests.tools.core [--code OLD] [--code .] [--names]
+
+Read as text: nothing of a checkout is imported. The lab is left out. What is counted:
+
+- numbers: names of a module that hold one, outside records; and those in bodies, but 0, 1, 2
+- reprojections: functions that say themselves where points lie in a photo
+- neighbour rules: functions that choose photos for a photo, or pairs of photos
+- bare participles: functions whose name is one (`told`, `blended`)
+- rooms, returns: modules that `pipeline.reconstruct` gets into by calls, in the order of the source, each
+  function once; and how often it gets into one that it had left
+"""
+
+import argparse
+import ast
+import re
+import sys
+from collections.abc import Iterator
+from pathlib import Path
+
+CORE = "langflash_core"
+START = f"{CORE}.pipeline.reconstruct"
+PRIMITIVES = (f"{CORE}.geometry.cameras", f"{CORE}.rig")
+FUNCTIONS = (ast.FunctionDef, ast.AsyncFunctionDef)
+IRREGULAR = re.compile(
+    "begun|bent|bound|brought|built|caught|chosen|cut|done|drawn|felt|found|given|gone|grown|held|kept|known|"
+    "laid|led|left|lit|lost|made|meant|met|put|read|said|seen|sent|set|shown|sought|spent|split|spoken|spread|"
+    "stood|swept|taken|taught|thought|told|torn|understood|woven|written"
+)
+PROJECTING = (f"{CORE}.geometry.cameras.pictured", f"{CORE}.geometry.cameras.project")
+CHOOSING = re.compile(
+    r"list\[(int|list\[int\]|tuple\[int, int\])\]|tuple\[tuple\[int, \.\.\.\], \.\.\.\]|"
+    r"Neighbours|Chosen|tuple\[Int\[Tensor, ' E'\], Int\[Tensor, ' E'\]\]"
+)
+OF_PHOTOS = {"viewmats", "num_views", "descriptors", "shared", "counts", "worth", "camera", "view", "rig"}
+
+
+def modules(checkout: Path) -> dict[str, ast.Module]:
+    """Syntax of every module of the core by its dotted name, the lab left out."""
+    found = {}
+    for path in sorted((checkout / CORE).rglob("*.py")):
+        parts = path.relative_to(checkout).with_suffix("").parts
+        if "lab" not in parts:
+            found[".".join(p for p in parts if p != "__init__")] = ast.parse(path.read_text(encoding="utf-8"))
+    return found
+
+
+def functions(tree: ast.Module) -> Iterator[tuple[str, ast.FunctionDef | ast.AsyncFunctionDef]]:
+    """Name, that of its class before it, and syntax of every function outside other functions."""
+    for node in tree.body:
+        if isinstance(node, FUNCTIONS):
+            yield node.name, node
+        if isinstance(node, ast.ClassDef):
+            yield from ((f"{node.name}.{n.name}", n) for n in node.body if isinstance(n, FUNCTIONS))
+
+
+def is_number(value: ast.expr | None) -> bool:
+    """A number, or a tuple, sum, product or call (`np.radians`) of numbers."""
+    match value:
+        case ast.Constant(value=held):
+            return isinstance(held, int | float) and not isinstance(held, bool)
+        case ast.UnaryOp(operand=inner):
+            return is_number(inner)
+        case ast.BinOp(left=first, right=second):
+            return is_number(first) and is_number(second)
+        case ast.Tuple(elts=every) | ast.Call(args=every, keywords=[]):
+            return bool(every) and all(map(is_number, every))
+    return False
+
+
+def constants(tree: ast.Module) -> list[str]:
+    """Names at the top of a module that hold numbers."""
+    names = []
+    for node in tree.body:
+        if isinstance(node, ast.Assign):
+            for target in node.targets:
+                if isinstance(target, ast.Tuple) and isinstance(node.value, ast.Tuple):
+                    pairs = zip(target.elts, node.value.elts, strict=False)
+                    names += [ast.unparse(one) for one, value in pairs if is_number(value)]
+                elif is_number(node.value):
+                    names.append(ast.unparse(target))
+        elif isinstance(node, ast.AnnAssign) and is_number(node.value):
+            names.append(ast.unparse(node.target))
+    return names
+
+
+def numbers_in_bodies(tree: ast.Module) -> int:
+    every = (node for _, function in functions(tree) for part in function.body for node in ast.walk(part))
+    held = [node.value for node in every if isinstance(node, ast.Constant)]
+    return sum(type(value) in (int, float) and value not in (0, 1, 2) for value in held)
+
+
+def imported(tree: ast.Module) -> dict[str, str]:
+    """Dotted names of what a module imports, by the names that it has there."""
+    every = (node for node in ast.walk(tree) if isinstance(node, ast.ImportFrom) and node.module)
+    return {one.asname or one.name: f"{node.module}.{one.name}" for node in every for one in node.names}
+
+
+def is_reprojection(function: ast.AST, known: dict[str, str]) -> bool:
+    """It calls what projects, or turns, divides, multiplies by a focal length and adds a principal point
+    itself; known: what the module imported, by name."""
+    called = (node.func for node in ast.walk(function) if isinstance(node, ast.Call))
+    if any(isinstance(name, ast.Name) and known.get(name.id) in PROJECTING for name in called):
+        return True
+    if any(isinstance(n, ast.Attribute) and n.attr == "diagonal" for n in ast.walk(function)):
+        return any(isinstance(n, ast.BinOp) and isinstance(n.op, ast.Div) for n in ast.walk(function))
+    places = {
+        ast.unparse(node.slice).strip("()").removeprefix("..., ").removeprefix(":, ").split(", None")[0]
+        for node in ast.walk(function)
+        if isinstance(node, ast.Subscript) and "K" in ast.unparse(node.value)
+    }
+    done = {type(node.op) for node in ast.walk(function) if isinstance(node, ast.BinOp)}
+    whole = done >= {ast.MatMult, ast.Div, ast.Mult, ast.Add}
+    return (
+        whole and bool(places & {"0, 0", "axis, axis", "a, a"}) and bool(places & {"0, 2", "axis, 2", "a, 2"})
+    )
+
+
+def is_neighbour_rule(function: ast.FunctionDef | ast.AsyncFunctionDef) -> bool:
+    returns = ast.unparse(function.returns) if function.returns else ""
+    given = {one.arg for one in (*function.args.args, *function.args.kwonlyargs)}
+    return bool(CHOOSING.fullmatch(returns)) and bool(given & OF_PHOTOS)
+
+
+def is_bare_participle(name: str) -> bool:
+    word = name.rsplit(".", 1)[-1].strip("_")
+    return "_" not in word and (
+        bool(IRREGULAR.fullmatch(word)) or (word.endswith("ed") and word not in ("seed", "need"))
+    )
+
+
+class Walk:
+    """What calls lead into, from one function on. entered: modules in the order of calls."""
+
+    def __init__(self, trees: dict[str, ast.Module]):
+        self._bodies = {
+            f"{m}.{name}": (m, node) for m, tree in trees.items() for name, node in functions(tree)
+        }
+        self._known = {m: imported(tree) for m, tree in trees.items()}
+        self._classes = {
+            f"{m}.{node.name}"
+            for m, tree in trees.items()
+            for node in tree.body
+            if isinstance(node, ast.ClassDef)
+        }
+        self._methods: dict[str, list[str]] = {}
+        for path in self._bodies:
+            if path.count(".") and path.rsplit(".", 1)[0] in self._classes:
+                self._methods.setdefault(path.rsplit(".", 1)[1], []).append(path)
+        self._visited, self.entered = set[str](), list[str]()
+
+    def follow(self, path: str) -> None:
+        if path in self._visited or path not in self._bodies:
+            return
+        self._visited.add(path)
+        module, function = self._bodies[path]
+        if not self.entered or self.entered[-1] != module:
+            self.entered.append(module)
+        calls = [node for node in ast.walk(function) if isinstance(node, ast.Call)]
+        for call in sorted(calls, key=lambda node: (node.end_lineno or 0, node.end_col_offset or 0)):
+            for place in (call.func, *call.args):
+                for target in self._targets(module, place):
+                    self.follow(target)
+
+    def _targets(self, module: str, called: ast.expr) -> list[str]:
+        if isinstance(called, ast.Name):
+            name = self._known[module].get(called.id, f"{module}.{called.id}")
+            return [f"{name}.__init__", f"{name}.__post_init__"] if name in self._classes else [name]
+        if isinstance(called, ast.Attribute):
+            own = self._methods.get(called.attr, [])
+            near = [path for path in own if path.startswith(f"{module}.")]
+            return near or (own if len(own) == 1 else [])
+        return []
+
+    @property
+    def returns(self) -> int:
+        return len(self.entered) - len(set(self.entered))
+
+
+def counts(checkout: Path) -> dict[str, list[str] | int]:
+    """What is counted of a checkout, as names where it has some."""
+    trees = modules(checkout)
+    every = [(m, name, node) for m, tree in trees.items() for name, node in functions(tree)]
+    outside = [of for of in every if not of[0].startswith(PRIMITIVES)]
+    known = {m: imported(tree) for m, tree in trees.items()}
+    root = [path.stem for path in sorted((checkout / CORE).glob("*.py")) if not path.stem.startswith("_")]
+    walk = Walk(trees)
+    sys.setrecursionlimit(10_000)
+    walk.follow(START)
+    return {
+        "numbers named in modules": [f"{m}.{name}" for m, tree in trees.items() for name in constants(tree)],
+        "numbers in bodies, but 0, 1, 2": sum(map(numbers_in_bodies, trees.values())),
+        "modules at the root": root,
+        "reprojections": [f"{m}.{name}" for m, name, node in outside if is_reprojection(node, known[m])],
+        "neighbour rules": [f"{m}.{name}" for m, name, node in outside if is_neighbour_rule(node)],
+        "bare participles": [f"{m}.{name}" for m, name, _ in every if is_bare_participle(name)],
+        "functions": len(every),
+        "rooms": sorted(set(walk.entered)),
+        "returns": walk.returns,
+    }
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawTextHelpFormatter)
+    parser.add_argument("--code", type=Path, action="append", help="a checkout (default: this one)")
+    parser.add_argument("--names", action="store_true", help="say what was counted, of the last one")
+    given = parser.parse_args()
+    columns = [counts(code) for code in given.code or [Path(__file__).parents[2]]]
+    for name, last in columns[-1].items():
+        figures = [len(found) if isinstance(found, list) else found for found in (c[name] for c in columns)]
+        sys.stdout.write(f"| {name} | " + " | ".join(map(str, figures)) + " |\n")
+        if given.names and isinstance(last, list):
+            sys.stdout.writelines(f"    {one}\n" for one in last)
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())
