@@ -245,10 +245,10 @@ def _selection(state: State, look: Look, right: float) -> list[do.Command]:
     imgui.push_style_var(imgui.StyleVar_.item_spacing, look.vec(4, 4))
     imgui.same_line(begin + imgui.calc_text_size(f"{count:,} selected").x + look.px(14))
     issued += _actions(right)
-    if editing.reached is not None:
-        issued += _levels(editing.reached, look, right)
     widgets.go_on(look.px(_GROWING), right, look.px(14))  # all of it
     issued += _growing(state, look)
+    if editing.reached is not None:
+        issued += _levels(editing.reached, look, right)
     imgui.pop_style_var()
     return issued
 
