@@ -40,7 +40,7 @@ def test_a_pair_is_judged_kept_and_judged_beside_what_was_kept(run, pair, tmp_pa
     # Photo, plain, normal, grid; whole and from near, each under a caption.
     assert bands.shape[1] >= 4 * width and bands.shape[0] > 2 * (height - 3) and bands.std() > 10
     table = tmp_path / "new" / "table.md"
-    again = run(*words[:2], *sorted(pair.iterdir()), *words[3:], "--beside", kept / "normal", "-o", table)
+    again = run(*words[:3], *sorted(pair.iterdir()), *words[4:], "--beside", kept / "normal", "-o", table)
     assert again.code == 0 and again.out == table.read_text()
     assert "| measure | photo through the grid | plain | normal | other version |" in again.out
     change = next(line for line in again.out.splitlines() if line.startswith("| The photos' own places"))
