@@ -130,7 +130,7 @@ def _making() -> Iterator[Job]:
     batch = ("batch", "in/sets", "-o", "out/batch", *tiny, "--prompt", "plant", "--export", ".ply")
     batch = (*batch, "--backend", "torch")
     yield Job("batch", _inline(*batch), _inline(*batch, "--fov", "40"), FILES, same=False)
-    labels = _inline("labels", "in/clips", "-o", "out/labels", "--workers", "1")
+    labels = _inline("lab", "labels", "in/clips", "-o", "out/labels", "--workers", "1")
     yield Job("labels", labels, labels, FILES, same=False)
     train = ("lab", "train", "run", "in/cache", "-o", "out/run", "--stages", "depth", "--minutes", "1")
     train, kinds = (*train, "--max-steps", "1"), (*FILES, "memory", "disk")  # torch writes by itself
