@@ -13,7 +13,7 @@ EXTRAS = {
     "open_clip": "full",
     "torchvision": "full",
     "timm": "full",
-    "matplotlib": "bench",
+    "matplotlib": "plots",
     "h5py": "photos",
     "skimage": "views",
     "OpenEXR": "views",

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, TextIO
 from langflash_core.errors import InputError, OutputError, PromptError, SceneFileError
 from langflash_core.files import check_folder, readable_file, staged_folder
 
-from ..report import ProgressBar, say_warnings, write_json
+from ..report import ProgressBar, write_json
 from ..scenes import open_scene
 
 if TYPE_CHECKING:
@@ -16,7 +16,7 @@ FRAMES = 8
 
 
 def run(args: Namespace, out: TextIO) -> None:
-    """Measure every mode on a scene or on generated ones; print a table, write JSON, CSV and a plot.
+    """Measure every mode on a scene or on generated ones; print a table, write JSON and CSV.
 
     Raises:
         LangFlashError: the scene, the phrases or the output cannot be used, or OpenGL is missing.
@@ -76,18 +76,10 @@ def _cases(args: Namespace) -> "list[Case]":
 
 
 def _write(args: Namespace, measured: dict) -> None:
-    """bench.json, bench.csv and, where matplotlib is installed, bench.png."""
+    """bench.json and bench.csv."""
     from ...bench import csv_text
 
     with staged_folder(args.output) as staging:
         with (staging / "bench.json").open("w", encoding="ascii") as stream:
             write_json(measured, stream)
         (staging / "bench.csv").write_text(csv_text(measured), encoding="utf-8")
-        try:
-            from ...bench.plot import write_plot
-        except ImportError:
-            say_warnings(
-                ["the plot is left out without matplotlib; pip install 'langflash[bench]' brings it"]
-            )
-        else:
-            write_plot(measured, staging / "bench.png")

@@ -37,6 +37,6 @@ def add_bench(commands) -> None:
     command.add_argument("--frames", type=whole_count, metavar="N", help="of the camera's way (default: 8)")
     command.add_argument("--only", nargs="+", choices=BENCH_AXES, help="what to compare (default: all)")
     command.add_argument(
-        "-o", "--output", type=Path, metavar="FOLDER", help="also write bench.json, bench.csv and bench.png"
+        "-o", "--output", type=Path, metavar="FOLDER", help="also write bench.json and bench.csv"
     )
     add_json(command)

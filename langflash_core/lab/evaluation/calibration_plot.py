@@ -1,4 +1,4 @@
-"""The reliability diagram of a calibration as a picture; needs matplotlib (extra `bench`)."""
+"""The reliability diagram of a calibration as a picture; needs matplotlib (extra `plots`)."""
 
 import io
 

@@ -1,5 +1,5 @@
 """What more photos cost, as a picture: processor time and memory against their number; needs matplotlib
-(extra `bench`)."""
+(extra `plots`)."""
 
 import io
 import math

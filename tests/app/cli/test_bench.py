@@ -2,7 +2,6 @@
 
 import csv
 import json
-import sys
 
 import pytest
 
@@ -29,12 +28,12 @@ def test_the_parser_knows_the_axes():
     assert BENCH_AXES == AXES
 
 
-def test_measures_a_scene_and_writes_three_files(run, scene_file, tmp_path):
+def test_measures_a_scene_and_writes_two_files(run, scene_file, tmp_path):
     folder = tmp_path / "out" / "bench"
     outcome = run("bench", scene_file, "--prompt", "armchair", *SMALL, "-o", folder)
     assert outcome.code == 0, outcome
     assert "float32" in outcome.out and "armchair" in outcome.out and "2,352 Gaussians" in outcome.out
-    assert {path.name for path in folder.iterdir()} == {"bench.json", "bench.csv", "bench.png"}
+    assert {path.name for path in folder.iterdir()} == {"bench.json", "bench.csv"}
     document = json.loads((folder / "bench.json").read_text())
     rows = document["cases"][0]["rows"]
     assert [row["mode"] for row in rows] == ["default", "float32"]
@@ -54,14 +53,6 @@ def test_the_papers_cases_at_a_chosen_size(run):
     document = run("bench", "--paper", "--synthetic", 60, *SMALL, "--json").json()
     assert [len(case["query"]["phrases"]) for case in document["cases"]] == [1, 16]
     assert all(case["scene"]["atoms"] == 128 for case in document["cases"])
-
-
-def test_without_matplotlib_the_rest_is_written(run, tmp_path, monkeypatch):
-    monkeypatch.setitem(sys.modules, "app.bench.plot", None)
-    outcome = run("bench", "--synthetic", 60, *SMALL, "-o", tmp_path)
-    assert outcome.code == 0
-    assert "langflash[bench]" in outcome.err
-    assert {path.name for path in tmp_path.iterdir()} == {"bench.json", "bench.csv"}
 
 
 def test_bad_input(refused, scene_file, tmp_path):  # noqa: F811

@@ -96,7 +96,7 @@ def _check(args: Namespace) -> None:
     if args.plot is not None:
         check_output_file(args.plot, (".png",), option="--plot")
         if find_spec("matplotlib") is None:
-            raise InputError("--plot needs matplotlib; pip install 'langflash[bench]' brings it")
+            raise InputError("--plot needs matplotlib; pip install 'langflash[plots]' brings it")
     if args.sheet is not None and args.results is None:
         raise InputError("--sheet shows what --results keeps; give --results, too")
     if args.colmap:
