@@ -103,11 +103,14 @@ def test_a_mode_that_is_wrong_shows_it(gl, case):
 
 
 def test_a_stale_order_is_right_while_the_camera_stands(gl, case):
+    """But for Gaussians that are as deep to a step of the quick order; what moves is drawn far worse."""
     stale = next(mode for mode in MODES if mode.axis == "sort")
-    for cameras, same in ((case.path.cameras[:1] * 3, True), (case.path.cameras[::2] * 2, False)):
+    late = []
+    for cameras in (case.path.cameras[:1] * 3, case.path.cameras[::2] * 2):
         moved = dataclasses.replace(case, path=Path(cameras, "by hand"))
-        (_, _, fresh), (_, _, late) = measure(gl, moved, (DEFAULT, stale), silent).rows
-        assert (fresh == late) == same
+        late.append(measure(gl, moved, (DEFAULT, stale), silent).rows[1][2].psnr)
+    standing, moving = late
+    assert standing > moving + 10
 
 
 def test_all_weights_are_the_scene_itself(gl, case):

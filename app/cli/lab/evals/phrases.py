@@ -12,6 +12,7 @@ from PIL import Image, ImageOps
 from langflash_core.errors import InputError
 from langflash_core.files import check_output_file, make_folder, write_atomically
 from langflash_core.formats import is_photo
+from langflash_core.picture_files import opened_picture
 
 from ...renderers import open_renderer
 from ...report import ProgressBar, write_tables
@@ -70,7 +71,7 @@ def _chosen(folder: Path, place: "Place", photos: int | None) -> list[Path]:
 
 
 def _size(path: Path) -> tuple[int, int]:
-    with Image.open(path) as picture:
+    with opened_picture(path) as picture:
         return ImageOps.exif_transpose(picture).size
 
 
