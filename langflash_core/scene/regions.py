@@ -47,8 +47,8 @@ GROWTH, OF_ONE = 0.2, 0.15
 """Powers of what tells a thing, beside how long its border holds: by how much the next region is larger, and
 how much of it is of the atom that was clicked. All numbers here were chosen on 12 held-out rooms (seeds
 900000200 to 211) beyond those that are judged; these and `THING` also on those of `tests.tools.clicks`."""
-_MOST_GROWTH = 4.0
-_SIZE = 0.25
+_MOST_GROWTH = 4.0  # times as large, from which a next region tells no more
+_SIZE = 0.25  # power of the smaller region's share of the photos: specks are joined first
 _STEP = 0.03  # of the logarithm of depth from a pixel to the next, beyond twice the steps beside: a jump
 _SAME = 0.05  # of the logarithm of depth, within which two photos show the same place
 _SHADE = 0.03  # of a colour, up to which neighbours are of one leaf
