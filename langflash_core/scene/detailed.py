@@ -106,8 +106,8 @@ def assemble_detailed(
     known, keep, unit = _kept(prediction, views, transients)
     sights = _Sights(lambda v: _Sight.of(photos[v], views.images[v], known[v].log(), keep[v]), len(photos))
     budget = gaussians or min(round(detail.most * int(keep.sum())), MOST_OF_LAYERS)
-    trees, limit = _trees(sights, detail, budget, 0.0 if gaussians else detail.gain, progress)
-    made, weights, parts = _made(prediction, views, _told(sights, progress, 0.5), trees, limit, top_m)
+    covers, limit = _covers(sights, detail, budget, 0.0 if gaussians else detail.gain, progress)
+    made, weights, parts = _made(prediction, views, _told(sights, progress, 0.5), covers, limit, top_m)
     size = sights[0].size
     scene = Scene(
         gaussians=normalised(made, unit),
@@ -203,23 +203,38 @@ def _kept(prediction: Prediction, views: Views, transients: Tensor | None) -> tu
     return depths, usable if transients is None else usable & ~transients, unit
 
 
-def _trees(
+@dataclass(frozen=True)
+class _Cover:
+    """The tree of one photo's squares, and what goes on behind its edges."""
+
+    tree: Tree
+    behind: Elements
+
+    @staticmethod
+    def of(sight: _Sight, finest: int) -> "_Cover":
+        tree = grown(sight.photo, sight.depth.log_depths, sight.clear, sight.wanted, finest)
+        behind = under(sight.log_depths, sight.image, sight.size)
+        grid = sight.image.shape[1:]
+        row, column = behind.cells // grid[1], behind.cells % grid[1]
+        ratio = [p / g for p, g in zip(sight.size, grid, strict=True)]
+        own = sight.wanted[((row + 0.5) * ratio[0]).long(), ((column + 0.5) * ratio[1]).long()]
+        return _Cover(tree, behind.rows(own))
+
+
+def _covers(
     sights: Sequence[_Sight], detail: Detail, budget: int, least: float, progress: Callable[[float], None]
-) -> tuple[list[Tree], float]:
-    """The tree of each photo, and the threshold by which all together have at most about `budget` elements,
+) -> tuple[list[_Cover], float]:
+    """What covers each photo, and the threshold by which all together have at most about `budget` elements,
     each of which gains `least`."""
-    trees = [
-        grown(s.photo, s.depth.log_depths, s.clear, s.wanted, detail.finest)
-        for s in _told(sights, progress, 0.0)
-    ]
-    return trees, _limit(trees, budget, least)
+    covers = [_Cover.of(sight, detail.finest) for sight in _told(sights, progress, 0.0)]
+    return covers, _limit(covers, budget, least)
 
 
 def _made(
     prediction: Prediction,
     views: Views,
     sights: Iterable[_Sight],
-    trees: list[Tree],
+    covers: list[_Cover],
     limit: float,
     top_m: int,
 ) -> tuple[Gaussians, list[tuple[Tensor, Tensor]], list[Elements]]:
@@ -227,40 +242,37 @@ def _made(
     it has borders (`borders`); and its elements. A photo at a time."""
     known = directed(prediction.dictionary)
     made, weights, parts = [], [], []
-    for view, (sight, tree) in enumerate(zip(sights, trees, strict=True)):
-        part = _of_view(sight, tree, limit)
+    for view, (sight, cover) in enumerate(zip(sights, covers, strict=True)):
+        part = _of_view(sight, cover, limit)
         camera = Camera(prediction.viewmats[view], views.Ks[view], *views.size)
         made.append(placed(part, sight.log_depths, sight.depth.slopes, camera, sight.size))
         refined = refined_weights(prediction.weights[view][known].float(), sight.image, sight.photo)
         width = sight.size[1]
         weights.append(sparse_weights(refined.at(part.pixels // width, part.pixels % width), top_m))
         parts.append(part)
-        if len(trees) > _HELD:
+        if len(covers) > _HELD:
             give_back()
     names = ("means", "quats", "scales", "opacities", "sh")
     whole = Gaussians(*(torch.cat([getattr(some, name) for some in made]) for name in names))
     return whole, weights, parts
 
 
-def _limit(trees: list[Tree], budget: int, least: float) -> float:
-    """The threshold of all photos' trees, the ground beneath what is parted counted in."""
-    limit = threshold(trees, budget, least)
+def _limit(covers: list[_Cover], budget: int, least: float) -> float:
+    """The threshold of all photos' trees, what goes on behind edges and the ground beneath what is parted
+    counted in."""
+    trees, left = [cover.tree for cover in covers], budget - sum(len(cover.behind) for cover in covers)
+    limit = threshold(trees, max(left, 0), least)
     for _ in range(2):  # the ground is a fifth of all, and nearly the same from one try to the next
         beneath = sum(len(leaves(tree, limit)[1]) for tree in trees)
-        limit = threshold(trees, max(budget - beneath, 0), least)
+        limit = threshold(trees, max(left - beneath, 0), least)
     return limit
 
 
-def _of_view(sight: _Sight, tree: Tree, limit: float) -> Elements:
-    squares, beneath = leaves(tree, limit)
+def _of_view(sight: _Sight, cover: _Cover, limit: float) -> Elements:
+    squares, beneath = leaves(cover.tree, limit)
     parts = [of_squares(some, sight.photo, sight.depth) for some in squares if len(some)]
     parts.append(ground(beneath, sight.photo, sight.depth))
-    parts = [drawn_in(part, sight.clear) for part in parts]
-    behind = under(sight.log_depths, sight.image, sight.size)
-    row, column = (behind.cells // sight.image.shape[2], behind.cells % sight.image.shape[2])
-    ratio = [p / g for p, g in zip(sight.size, sight.image.shape[1:], strict=True)]
-    own = sight.wanted[((row + 0.5) * ratio[0]).long(), ((column + 0.5) * ratio[1]).long()]
-    return joined([*parts, behind.rows(own)])
+    return joined([*(drawn_in(part, sight.clear) for part in parts), cover.behind])
 
 
 def _confidences(prediction: Prediction, parts: list[Elements]) -> Tensor:
