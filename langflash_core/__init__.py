@@ -39,9 +39,10 @@ helps behind its semicolon.
 from importlib import import_module
 from typing import TYPE_CHECKING
 
-from langflash_core.threads import wait_asleep
+from langflash_core.base.threads import wait_asleep
 
 if TYPE_CHECKING:
+    from langflash_core.base.request import ExportRequest as ExportRequest
     from langflash_core.errors import LangFlashError as LangFlashError
     from langflash_core.export import export as save
     from langflash_core.export import read as load
@@ -51,7 +52,6 @@ if TYPE_CHECKING:
     from langflash_core.pipeline import reconstruct as reconstruct
     from langflash_core.pipeline import select as select
     from langflash_core.reconstruction.networks import Networks as Networks
-    from langflash_core.request import ExportRequest as ExportRequest
     from langflash_core.segments import segment as segment
     from langflash_core.writing import write as write
     from langflash_core.writing.rendering import render as render

@@ -19,6 +19,8 @@ import numpy as np
 import torch
 from jaxtyping import Bool, Float, UInt8
 
+from langflash_core.base.picture_files import STORED, opened_picture
+from langflash_core.base.records import Guess, World
 from langflash_core.errors import InputError, LangFlashError
 from langflash_core.geometry.manhattan import Directions, Sights, found_directions
 from langflash_core.images.lines import line_segments
@@ -26,8 +28,6 @@ from langflash_core.language.answers import world_points
 from langflash_core.language.gaussians import gaussian_relevance
 from langflash_core.language.relevance import compile_query
 from langflash_core.language.spaces import language_space
-from langflash_core.picture_files import STORED, opened_picture
-from langflash_core.records import Guess, World
 from langflash_core.scene.standing import normals_of
 from langflash_core.scene.thin import covered_areas
 from langflash_core.scene.world import placed, turn_of

@@ -21,6 +21,7 @@ from PIL import Image
 from scipy.spatial import KDTree
 from torch import Tensor
 
+from langflash_core.base.records import Shift
 from langflash_core.errors import Cancelled, InputError
 from langflash_core.export.cameras import read_posed
 from langflash_core.geometry.cameras import invert_rigid
@@ -30,9 +31,8 @@ from langflash_core.images.views import load_views
 from langflash_core.level import on_its_head
 from langflash_core.network import PRESETS, load_network
 from langflash_core.network.posed import posed_semantics
-from langflash_core.records import Shift
-from langflash_core.scene.assemble import sparse_weights
 from langflash_core.scene.lookouts import lookouts
+from langflash_core.scene.weights import sparse_weights
 from langflash_core.splat import render as render_reference
 from langflash_core.splat.backprojection import gathered
 from langflash_core.splat.compose import Nearness, shares

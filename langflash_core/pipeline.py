@@ -10,8 +10,9 @@ from typing import TYPE_CHECKING
 import torch
 from torch import Tensor
 
-from langflash_core.ahead import Ahead
-from langflash_core.detail import DEFAULT_DETAIL
+from langflash_core.base.detail import DEFAULT_DETAIL
+from langflash_core.base.resources import asset_path
+from langflash_core.base.running import Progress, Run
 from langflash_core.errors import InputError, PromptError, ViewError
 from langflash_core.export import opened
 from langflash_core.images.decode import grey_photo
@@ -23,8 +24,7 @@ from langflash_core.language.relevance import Mode, finite_dictionary, relevance
 from langflash_core.language.spaces import language_space
 from langflash_core.language.spoken import compile_spoken
 from langflash_core.language.vocabulary import all_phrases
-from langflash_core.resources import asset_path
-from langflash_core.running import Progress, Run
+from langflash_core.reconstruction.ahead import Ahead
 from langflash_core.scene.exposure import lit_camera
 from langflash_core.scene.tour import Note, Stop, read_tour
 from langflash_core.scene.world import upward
@@ -337,7 +337,7 @@ def best_pair(
     Raises:
         ImageError: a photo cannot be used. Cancelled: `cancelled()` became true.
     """
-    from langflash_core.network import choose_pair
+    from langflash_core.cameras.pairs import choose_pair
     from langflash_core.reconstruction.stages import STAGES
 
     run = Run(STAGES, None, cancelled)

@@ -30,11 +30,11 @@ import torch
 from jaxtyping import Bool, Float, Int, Integer, Shaped
 from torch import Tensor
 
-from langflash_core.records import Cost as Cost
-from langflash_core.records import FoundFocal as FoundFocal
-from langflash_core.records import FoundLens as FoundLens
-from langflash_core.records import Record as Record
-from langflash_core.records import check_light
+from langflash_core.base.records import Cost as Cost
+from langflash_core.base.records import FoundFocal as FoundFocal
+from langflash_core.base.records import FoundLens as FoundLens
+from langflash_core.base.records import Record as Record
+from langflash_core.base.records import check_light
 
 LUMA = (0.299, 0.587, 0.114)
 """Weights of red, green and blue in grey (ITU-R BT.601, as JPEG has them)."""

@@ -117,8 +117,8 @@ def unchecked(monkeypatch):
 @pytest.fixture(scope="session")
 def context():
     """One OpenGL context without a window for all tests; they are skipped where there is none."""
+    from langflash_core.base.graphics import offscreen_context
     from langflash_core.errors import GraphicsError
-    from langflash_core.graphics import offscreen_context
 
     try:
         made = offscreen_context()

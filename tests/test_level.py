@@ -8,6 +8,7 @@ import pytest
 import torch
 
 from langflash_core import level
+from langflash_core.base.records import SURE, Guess, World
 from langflash_core.errors import InputError
 from langflash_core.level import (
     NOT_SURE,
@@ -20,7 +21,6 @@ from langflash_core.level import (
     seen_at,
     upright,
 )
-from langflash_core.records import SURE, Guess, World
 from langflash_core.scene.world import turn_of
 from langflash_core.types import Gaussians
 from tests.boxroom import EYE, HIGH, METRES, box_room, true_up, without_language

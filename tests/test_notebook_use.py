@@ -13,9 +13,9 @@ from PIL import Image
 
 import langflash_core as lf
 from langflash_core.__main__ import NAME, find_program
+from langflash_core.base.request import ExportRequest
 from langflash_core.errors import GraphicsError, SceneFileError, ViewError
 from langflash_core.language.spaces import language_space
-from langflash_core.request import ExportRequest
 from langflash_core.splat import render as reference
 from langflash_core.types import Gaussians, Prediction, Scene, Semantics, Views
 from langflash_core.writing.renderers import TorchRenderer

@@ -17,8 +17,8 @@ import pytest
 from packaging.requirements import Requirement
 
 import langflash_core
-from langflash_core.extras import EXTRAS
-from langflash_core.resources import asset_path
+from langflash_core.base.optional import EXTRAS
+from langflash_core.base.resources import asset_path
 
 ROOT = Path(__file__).resolve().parent.parent
 OTHERS = "others_app-1.0"
@@ -311,7 +311,7 @@ def test_installed_renderer_finds_its_shaders(installed, tmp_path):
 import torch
 from pathlib import Path
 from langflash_app.gl import SplatRenderer, offscreen_context
-from langflash_core.resources import shader_path
+from langflash_core.base.resources import shader_path
 from langflash_core.types import Gaussians, Scene, Semantics
 
 one = Gaussians(torch.tensor([[0.0, 0.0, 1.0]]), torch.tensor([[1.0, 0, 0, 0]]), torch.full((1, 3), 0.2),

@@ -11,6 +11,8 @@ import pytest
 import torch
 
 import langflash_core as lf
+from langflash_core.base.records import FoundFocal
+from langflash_core.base.resources import asset_path
 from langflash_core.errors import Cancelled, ImageError, InputError, PromptError, ViewError, WeightsError
 from langflash_core.images.straight import straightened
 from langflash_core.language.spaces import language_space
@@ -18,8 +20,6 @@ from langflash_core.level import levelled
 from langflash_core.network import PRESETS, GuidedDepthNet, build_network, save_network
 from langflash_core.reconstruction import stages
 from langflash_core.reconstruction.views import found_views, straight_prediction
-from langflash_core.records import FoundFocal
-from langflash_core.resources import asset_path
 from langflash_core.splat import render
 from langflash_core.types import Camera, FoundLens, Gaussians, Lenses, Prediction, Scene, Semantics, Views
 

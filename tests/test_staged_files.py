@@ -5,9 +5,9 @@ from pathlib import Path
 
 import pytest
 
-from langflash_core import files
+from langflash_core.base import files
+from langflash_core.base.files import check_folder, check_output_file, move_all, staged_folder
 from langflash_core.errors import OutputError
-from langflash_core.files import check_folder, check_output_file, move_all, staged_folder
 
 
 def test_folder_is_made_only_at_the_end(tmp_path):
@@ -44,7 +44,7 @@ def test_what_a_killed_process_leaves_goes_at_the_next_write(tmp_path):
     code = """if True:
         import os, sys
         from pathlib import Path
-        from langflash_core.files import staged_folder
+        from langflash_core.base.files import staged_folder
 
         with staged_folder(Path(sys.argv[1]) / "new") as staging:
             (staging / "x.txt").write_bytes(b"x")

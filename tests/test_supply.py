@@ -16,10 +16,10 @@ from packaging.utils import canonicalize_name
 from packaging.version import Version
 
 from app.cli import main
-from langflash_core import shipped
+from langflash_core.base import shipped
+from langflash_core.base.resources import asset_path
 from langflash_core.errors import WeightsError
 from langflash_core.network.checkpoints.stored import read_stored
-from langflash_core.resources import asset_path
 
 ROOT = Path(__file__).resolve().parent.parent
 ADVISORIES = json.loads((ROOT / "tests" / "advisories.json").read_text(encoding="utf-8"))

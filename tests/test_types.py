@@ -5,7 +5,7 @@ from dataclasses import replace
 import pytest
 import torch
 
-from langflash_core.resources import asset_path, shader_path
+from langflash_core.base.resources import asset_path, shader_path
 from langflash_core.types import Camera, Gaussians, Record, Scene, Semantics
 
 

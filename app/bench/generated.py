@@ -10,7 +10,7 @@ from torch.nn.functional import normalize
 from langflash_core.geometry.cameras import intrinsics_from_fov, invert_rigid
 from langflash_core.geometry.harmonics import SH_C0
 from langflash_core.language.relevance import CompiledQuery, reduce_dictionary
-from langflash_core.scene.assemble import renormalised
+from langflash_core.scene.weights import renormalised
 from langflash_core.types import Gaussians, Scene, Semantics
 
 SPACE = "generated"

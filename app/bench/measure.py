@@ -14,9 +14,9 @@ from dataclasses import dataclass, field, replace
 import moderngl
 import numpy as np
 
-from langflash_core.graphics import Programs
+from langflash_core.base.graphics import Programs
+from langflash_core.base.running import Progress
 from langflash_core.language.relevance import CompiledQuery
-from langflash_core.running import Progress
 from langflash_core.types import Camera, Scene
 
 from ..gl import SplatRenderer

@@ -6,9 +6,9 @@ from typing import Literal
 
 import moderngl
 
-from langflash_core.graphics import draws_in_software
-from langflash_core.scene.assemble import renormalised
+from langflash_core.base.graphics import draws_in_software
 from langflash_core.scene.thin import thin
+from langflash_core.scene.weights import renormalised
 from langflash_core.types import Scene
 
 from ..gl.answers import MakeAnswers, ShaderAnswers

@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from langflash_core.language.relevance import CompiledQuery
-from langflash_core.scene.prune import CUT
+from langflash_core.surface.prune import CUT
 
 from .cases import Case
 from .errors import Errors

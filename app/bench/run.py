@@ -2,7 +2,7 @@
 
 from collections.abc import Collection, Sequence
 
-from langflash_core.running import Progress
+from langflash_core.base.running import Progress
 
 from ..gl import offscreen_context
 from .cases import Case

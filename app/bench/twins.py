@@ -4,7 +4,7 @@ so that the decision can be measured. Splats go into `SplatRenderer(...)`, answe
 import moderngl
 import numpy as np
 
-from langflash_core.graphics import Programs
+from langflash_core.base.graphics import Programs
 from langflash_core.language.relevance import EMPTY_NORM, CompiledQuery
 from langflash_core.types import Camera, Scene
 

@@ -10,9 +10,9 @@ import subprocess
 import sys
 from pathlib import Path
 
+from langflash_core.base.files import make_folder, write_atomically
+from langflash_core.base.resources import asset_path
 from langflash_core.errors import InputError, OutputError
-from langflash_core.files import make_folder, write_atomically
-from langflash_core.resources import asset_path
 
 TYPE = "application/x-langflash-scene"
 MARK = "LangFlash"  # in every file of ours

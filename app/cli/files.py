@@ -3,9 +3,9 @@
 from collections.abc import Sequence
 from pathlib import Path
 
+from langflash_core.base.files import photos_in, readable_file
+from langflash_core.base.formats import is_film
 from langflash_core.errors import ImageError, SceneFileError
-from langflash_core.files import photos_in, readable_file
-from langflash_core.formats import is_film
 
 
 def checked_scene(path: Path) -> Path:

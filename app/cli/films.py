@@ -5,12 +5,12 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
+from langflash_core.base.files import readable_file
+from langflash_core.base.formats import is_film
+from langflash_core.base.running import Progress
 from langflash_core.errors import FilmError, InputError
-from langflash_core.files import readable_file
-from langflash_core.formats import is_film
 from langflash_core.images.pictures import FILM_PHOTOS, MAX_PHOTOS
 from langflash_core.images.strip import REASONS, Choice, Strip, choose, notes_on
-from langflash_core.running import Progress
 
 
 def look_through(

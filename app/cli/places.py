@@ -13,6 +13,10 @@ import torch
 from PIL import Image
 
 from langflash_core import pipeline
+from langflash_core.base.files import filled_atomically, readable_file, write_atomically
+from langflash_core.base.memory import peak_memory_mb
+from langflash_core.base.optional import optional_packages
+from langflash_core.base.picture_files import STORED, opened_picture
 from langflash_core.batch.dispatch import Job, Made
 from langflash_core.batch.order import Order, export_path
 from langflash_core.batch.run import SCENE
@@ -20,10 +24,6 @@ from langflash_core.batch.summary import THUMBNAIL
 from langflash_core.errors import ImageError, PromptError
 from langflash_core.export.answers import answers_document, write_answers
 from langflash_core.export.png import heat_over, to_8bit
-from langflash_core.extras import optional_packages
-from langflash_core.files import filled_atomically, readable_file, write_atomically
-from langflash_core.memory import peak_memory_mb
-from langflash_core.picture_files import STORED, opened_picture
 from langflash_core.reconstruction.networks import Networks
 from langflash_core.scene.file import load, save
 from langflash_core.types import QueryResult, Scene

@@ -8,8 +8,8 @@ import signal
 import sys
 from collections.abc import Sequence
 
+from langflash_core.base.optional import optional_packages
 from langflash_core.errors import LangFlashError
-from langflash_core.extras import optional_packages
 
 from .overview import LAB, first_day
 from .parser import build_parser

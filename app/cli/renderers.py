@@ -4,8 +4,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING
 
+from langflash_core.base.optional import optional_packages
 from langflash_core.errors import GraphicsError, MissingPackageError
-from langflash_core.extras import optional_packages
 from langflash_core.types import Camera, Frame, Scene
 from langflash_core.writing.renderers import Renderer, Shown, TorchRenderer
 
@@ -68,7 +68,7 @@ class GlRenderer:
     def _current(self) -> Iterator[None]:
         """The context is the one in use, since another renderer's may have been; what its driver refuses is
         a sentence."""
-        from langflash_core.graphics import refusals_said
+        from langflash_core.base.graphics import refusals_said
 
         with self._context, refusals_said(self._context, "try a smaller --size, or --backend torch"):
             yield

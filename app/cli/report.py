@@ -9,10 +9,10 @@ from argparse import Namespace
 from collections.abc import Iterable
 from typing import Any, TextIO
 
+from langflash_core.base.files import make_folder, write_atomically
+from langflash_core.base.memory import out_of_memory
+from langflash_core.base.running import left
 from langflash_core.errors import LangFlashError
-from langflash_core.files import make_folder, write_atomically
-from langflash_core.memory import out_of_memory
-from langflash_core.running import left
 
 INTERRUPTED = 130
 """What a shell reports for a program that Ctrl-C ended: 128 and the signal's number."""

@@ -3,8 +3,8 @@
 from collections.abc import Sequence
 from pathlib import Path
 
+from langflash_core.base.files import readable_file
 from langflash_core.errors import SceneFileError
-from langflash_core.files import readable_file
 from langflash_core.types import NO_LANGUAGE, Scene
 
 from .report import say_warnings

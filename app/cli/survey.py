@@ -6,8 +6,8 @@ from functools import partial
 from pathlib import Path
 from typing import TextIO
 
+from langflash_core.base.files import check_folder, staged_folder
 from langflash_core.errors import InputError, LangFlashError, PromptError
-from langflash_core.files import check_folder, staged_folder
 
 from .report import ProgressBar, say_warnings, write_json
 
@@ -27,7 +27,7 @@ def run_survey(args: Namespace, phrases: Sequence[str], negatives: Sequence[str]
     for phrase in phrases:
         once.setdefault(phrase.strip().lower(), phrase)
     check_folder(args.output)
-    from langflash_core.colormaps import HeatColours
+    from langflash_core.base.colormaps import HeatColours
     from langflash_core.writing.survey import Reply, ask_scene, write_survey
 
     from .renderers import open_renderer

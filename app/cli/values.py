@@ -4,9 +4,9 @@ import math
 import re
 from argparse import ArgumentTypeError
 
-from langflash_core.detail import FEWEST, MOST
-from langflash_core.formats import LARGEST_SIDE
-from langflash_core.pictures import SPOKEN, WORDS, Picture
+from langflash_core.base.detail import FEWEST, MOST
+from langflash_core.base.formats import LARGEST_SIDE
+from langflash_core.base.pictures import SPOKEN, WORDS, Picture
 
 
 def size(text: str) -> tuple[int, int]:

@@ -5,8 +5,8 @@ from typing import Literal
 
 import moderngl
 
+from langflash_core.base.graphics import OPENGL
 from langflash_core.errors import GraphicsError
-from langflash_core.graphics import OPENGL
 
 from .hardware import Hardware, hardware_of
 from .painter import Painter

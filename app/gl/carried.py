@@ -7,7 +7,7 @@ import numpy as np
 import torch
 from torch.nn import functional as F
 
-from langflash_core.graphics import Programs, set_uniforms
+from langflash_core.base.graphics import Programs, set_uniforms
 
 from .layout import ATOMS_A_LAYER
 

@@ -3,7 +3,7 @@
 import moderngl
 import numpy as np
 
-from langflash_core.graphics import Programs, set_uniforms
+from langflash_core.base.graphics import Programs, set_uniforms
 
 from .layout import ATOMS_A_LAYER
 from .splats import SplatBuffers

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 import moderngl
 import numpy as np
 
-from langflash_core.colormaps import colour_stops
+from langflash_core.base.colormaps import colour_stops
+from langflash_core.base.pictures import COUNT_COLOURS
 from langflash_core.language.answers import COVERED_ALPHA
-from langflash_core.pictures import COUNT_COLOURS
 from langflash_core.scene.trust import COSINES
 from langflash_core.types import Camera, Scene
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 
 import moderngl
 
-from langflash_core.graphics import draws_in_software
+from langflash_core.base.graphics import draws_in_software
 
 from .answers import MakeAnswers, ShaderAnswers
 from .processor.cell_maps import CellMaps

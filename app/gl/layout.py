@@ -8,7 +8,7 @@ Relevance: four phrases a layer.
 
 import math
 
-from langflash_core.colormaps import NUM_STOPS
+from langflash_core.base.colormaps import NUM_STOPS
 
 ATOMS_A_LAYER = 3
 LAYERS_A_PASS = 8

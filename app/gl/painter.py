@@ -6,7 +6,7 @@ from collections.abc import Mapping
 import moderngl
 import numpy as np
 
-from langflash_core.graphics import Programs, set_uniforms
+from langflash_core.base.graphics import Programs, set_uniforms
 
 from .layout import DEFINES
 from .shapes import MakeShapes, Quads

@@ -1,4 +1,4 @@
-"""How each picture of `langflash_core/pictures.py` is painted of what a renderer drew, by its name there."""
+"""How each picture of `base/pictures.py` is painted of what a renderer drew, by its name there."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -6,9 +6,9 @@ from dataclasses import dataclass
 import moderngl
 import numpy as np
 
-from langflash_core import pictures
-from langflash_core.colormaps import HeatColours, colour_stops
-from langflash_core.pictures import Picture, margin_span
+from langflash_core.base import pictures
+from langflash_core.base.colormaps import HeatColours, colour_stops
+from langflash_core.base.pictures import Picture, margin_span
 
 from .renderer import SplatRenderer
 

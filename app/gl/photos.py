@@ -5,7 +5,7 @@ import numpy as np
 from torch import Tensor
 
 from langflash_core.language.answers import COVERED_ALPHA
-from langflash_core.scene.consistency import TOLERANCE
+from langflash_core.surface.consistency import TOLERANCE
 from langflash_core.types import Camera, Scene
 
 from .colour import draw_colour

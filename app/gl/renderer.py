@@ -19,8 +19,8 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from langflash_core.base.formats import COLOUR_MAPS
 from langflash_core.errors import GraphicsError
-from langflash_core.formats import COLOUR_MAPS
 from langflash_core.language.relevance import CompiledQuery
 from langflash_core.scene.changes import Change
 from langflash_core.splat.projection import NEAR

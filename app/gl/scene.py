@@ -7,8 +7,8 @@ from functools import cached_property
 import moderngl
 import numpy as np
 
+from langflash_core.base.graphics import Programs
 from langflash_core.export.colours import atom_colours
-from langflash_core.graphics import Programs
 from langflash_core.scene.changed import changed
 from langflash_core.scene.changes import Change
 from langflash_core.scene.thin import thin_with_rows

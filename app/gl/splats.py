@@ -6,7 +6,7 @@ import moderngl
 import numpy as np
 import torch
 
-from langflash_core.graphics import Programs, set_uniforms
+from langflash_core.base.graphics import Programs, set_uniforms
 from langflash_core.splat.projection import ALPHA_MIN, drawable_rows
 from langflash_core.types import Camera, Gaussians, Scene
 

@@ -7,7 +7,7 @@ from contextlib import contextmanager
 import moderngl
 import numpy as np
 
-from langflash_core.graphics import bound_framebuffer, draws_in_software
+from langflash_core.base.graphics import bound_framebuffer, draws_in_software
 
 _GL_FRAMEBUFFER = 0x8D40
 _GL_COLOR_ATTACHMENT0 = 0x8CE0

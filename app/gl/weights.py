@@ -8,7 +8,7 @@ from functools import reduce
 import moderngl
 import numpy as np
 
-from langflash_core.graphics import set_uniforms
+from langflash_core.base.graphics import set_uniforms
 
 from .blend import add_maps
 from .layout import ATOMS_A_LAYER, ATOMS_A_PASS, LAYERS_A_PASS, num_layers

@@ -1,6 +1,6 @@
 """What a window does once nothing happens in it: it gives memory back."""
 
-from langflash_core.memory import give_back
+from langflash_core.base.memory import give_back
 
 from .commands import Command, Measured, Tick
 from .effects import Effects, Hands

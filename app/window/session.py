@@ -16,9 +16,9 @@ import glfw
 from imgui_bundle import imgui, implot
 from imgui_bundle.python_backends.glfw_backend import GlfwRenderer
 
+from langflash_core.base.graphics import refusals_said
+from langflash_core.base.memory import keep_tidy
 from langflash_core.errors import LangFlashError
-from langflash_core.graphics import refusals_said
-from langflash_core.memory import keep_tidy
 
 from . import desktop
 from .asking.effects import AskingEffects

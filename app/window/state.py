@@ -6,10 +6,10 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from langflash_core.colormaps import HeatColours
+from langflash_core.base.colormaps import HeatColours
+from langflash_core.base.records import Guess, World
 from langflash_core.geometry import rotations
 from langflash_core.geometry.poses import UP, Pose
-from langflash_core.records import Guess, World
 from langflash_core.scene.tour import NO_TOUR, read_tour
 from langflash_core.scene.tour import Tour as ToldTour
 

@@ -13,9 +13,9 @@ import moderngl
 import numpy as np
 from jaxtyping import UInt8
 
+from langflash_core.base.graphics import draws_in_software
 from langflash_core.errors import GraphicsError
 from langflash_core.geometry.poses import Pose
-from langflash_core.graphics import draws_in_software
 from langflash_core.scene.changes import Change
 from langflash_core.scene.edits import Marks
 from langflash_core.scene.mask import Mask

@@ -20,8 +20,8 @@ from queue import Empty, SimpleQueue
 
 from PIL import Image
 
+from langflash_core.base.memory import give_back, out_of_memory
 from langflash_core.errors import Cancelled, LangFlashError
-from langflash_core.memory import give_back, out_of_memory
 
 from .commands import Command, Notify, OfScene
 from .requests import Job, SceneTask, Task
@@ -219,7 +219,7 @@ def _link_torch() -> None:
 
 def _import_ahead(name: str) -> None:
     """Import what would be waited for later, while nobody waits."""
-    from langflash_core.torchvision_fix import ensure_torchvision
+    from langflash_core.base.torchvision_fix import ensure_torchvision
 
     try:
         if name == "torchvision":

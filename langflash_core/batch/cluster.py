@@ -9,9 +9,9 @@ from collections.abc import Sequence
 from contextlib import ExitStack
 from typing import Any
 
+from langflash_core.base.optional import optional_packages
 from langflash_core.batch.dispatch import Job, Lost, Made, OpenMaker
 from langflash_core.errors import InputError
-from langflash_core.extras import optional_packages
 
 LOCAL = "local"  # the address of a cluster on this machine, begun for this run
 _PATIENCE = 10.0  # seconds for a machine to answer

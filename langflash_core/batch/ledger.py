@@ -10,8 +10,8 @@ from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 
+from langflash_core.base.files import make_folder, write_atomically
 from langflash_core.errors import OutputError
-from langflash_core.files import make_folder, write_atomically
 
 DONE, FAILED = "done", "failed"
 

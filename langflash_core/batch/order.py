@@ -5,7 +5,7 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from langflash_core.detail import DEFAULT_DETAIL
+from langflash_core.base.detail import DEFAULT_DETAIL
 
 
 @dataclass(frozen=True)

@@ -7,8 +7,8 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from pathlib import Path
 
+from langflash_core.base.formats import is_photo
 from langflash_core.errors import InputError
-from langflash_core.formats import is_photo
 
 LEDGER, SUMMARY = "ledger.csv", "summary.html"
 _LONGEST_NAME = 120  # bytes; with what is put around it while it is written, below 255

@@ -6,9 +6,9 @@ from html import escape
 from pathlib import Path
 from urllib.parse import quote
 
+from langflash_core.base.files import write_atomically
 from langflash_core.batch.ledger import FAILED, Row
 from langflash_core.batch.sets import SUMMARY
-from langflash_core.files import write_atomically
 
 THUMBNAIL = "thumbnail.jpg"  # in a set's folder
 _NUMBERS = {

@@ -3,9 +3,9 @@
 import os
 from pathlib import Path
 
+from langflash_core.base.formats import AXES, kind_of
+from langflash_core.base.outputs import OUTPUTS, READERS, loaded
 from langflash_core.errors import InputError, LangFlashError, OutputError, SceneFileError
-from langflash_core.formats import AXES, kind_of
-from langflash_core.outputs import OUTPUTS, READERS, loaded
 from langflash_core.types import Frame, QueryResult, Scene
 
 __all__ = ["READERS", "WRITERS", "export", "opened", "read"]

@@ -6,7 +6,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from langflash_core.colormaps import HeatColours
+from langflash_core.base.colormaps import HeatColours
+from langflash_core.base.files import make_folder
 from langflash_core.export.npz import write_npz
 from langflash_core.export.png import (
     USUAL,
@@ -17,7 +18,6 @@ from langflash_core.export.png import (
     write_relevance,
     write_rgb,
 )
-from langflash_core.files import make_folder
 from langflash_core.types import PromptAnswer, QueryResult, Scene
 
 _MAX_NAME = 60

@@ -20,14 +20,14 @@ from pathlib import Path, PurePosixPath
 import torch
 from torch import Tensor
 
+from langflash_core.base.files import make_folder, write_atomically
+from langflash_core.base.limits import VIEWS
+from langflash_core.base.picture_files import STORED, opened_picture, stored_shape
 from langflash_core.errors import OutputError, SceneFileError
 from langflash_core.export.colmap import check_pinhole, pinhole, read_model, text_lines
-from langflash_core.files import make_folder, write_atomically
 from langflash_core.geometry.cameras import MIRRORED, invert_rigid, turned_camera
 from langflash_core.geometry.harmonics import SH_C0
 from langflash_core.geometry.quaternions import matrices_to_quats
-from langflash_core.limits import VIEWS
-from langflash_core.picture_files import STORED, opened_picture, stored_shape
 from langflash_core.types import Scene
 
 COLMAP, TRANSFORMS = "cameras.txt", "transforms.json"

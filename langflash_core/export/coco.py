@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from langflash_core.files import write_atomically
+from langflash_core.base.files import write_atomically
 from langflash_core.types import QueryResult
 
 

@@ -16,9 +16,9 @@ from pathlib import Path
 import torch
 from torch import Tensor
 
+from langflash_core.base.limits import TEXT, VIEWS
 from langflash_core.errors import SceneFileError
 from langflash_core.geometry.quaternions import quats_to_matrices
-from langflash_core.limits import TEXT, VIEWS
 
 Lens = tuple[Tensor, tuple[int, int]]
 """K (3, 3) float64 in pixels of photos of a size (width, height)."""

@@ -11,9 +11,9 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from langflash_core.colormaps import colour_stops
+from langflash_core.base.colormaps import colour_stops
+from langflash_core.base.formats import COLOUR_MAPS
 from langflash_core.export.stored import Rows
-from langflash_core.formats import COLOUR_MAPS
 from langflash_core.geometry.harmonics import SH_C0
 
 # How glTF and OpenUSD call them (of a display, of a scene; to photos that is one), and drafts of glTF's.

@@ -16,12 +16,12 @@ from pathlib import Path
 
 import numpy as np
 
+from langflash_core.base.files import write_atomically
 from langflash_core.errors import SceneFileError
 from langflash_core.export.antialiased import ply_comments, ply_model
 from langflash_core.export.packing import check_some, from_smallest_three, morton_order, smallest_three
 from langflash_core.export.ply import HEADER_END, bytes_of, only_blanks, read_elements, read_ply
 from langflash_core.export.stored import Gathering, Rows, parts, to_scene
-from langflash_core.files import write_atomically
 from langflash_core.geometry.harmonics import MAX_SHOWN_DEGREE, SH_C0
 from langflash_core.types import Gaussians, Scene
 

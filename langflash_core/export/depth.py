@@ -15,8 +15,8 @@ from jaxtyping import Float
 from PIL import Image
 from PIL.PngImagePlugin import PngInfo
 
-from langflash_core.extras import optional_packages
-from langflash_core.files import write_atomically, written_atomically
+from langflash_core.base.files import write_atomically, written_atomically
+from langflash_core.base.optional import optional_packages
 from langflash_core.types import Frame
 
 LARGEST = 2**16 - 1

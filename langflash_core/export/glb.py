@@ -14,9 +14,9 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from jaxtyping import Float
 
+from langflash_core.base.files import write_atomically
 from langflash_core.errors import PromptError
 from langflash_core.export.colours import label_colours, linear
-from langflash_core.files import write_atomically
 from langflash_core.geometry.fusion import Surface
 from langflash_core.types import QueryResult
 

@@ -21,6 +21,7 @@ from typing import Any
 
 import numpy as np
 
+from langflash_core.base.files import write_atomically
 from langflash_core.errors import SceneFileError
 from langflash_core.export.colours import encoding_of, linear, with_srgb_colours
 from langflash_core.export.gltf_document import (
@@ -37,7 +38,6 @@ from langflash_core.export.gltf_document import (
 from langflash_core.export.language import packed_language, speaks, with_language
 from langflash_core.export.packing import check_some, placed, told, turned
 from langflash_core.export.stored import ROWS_AT_ONCE, Gathering, Rows, parts, to_scene
-from langflash_core.files import write_atomically
 from langflash_core.geometry.harmonics import MAX_SHOWN_DEGREE, SH_C0
 from langflash_core.geometry.turning import axes_matrix
 from langflash_core.types import Gaussians, Scene

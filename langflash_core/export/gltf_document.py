@@ -18,9 +18,9 @@ from urllib.parse import unquote_to_bytes
 import numpy as np
 import torch
 
+from langflash_core.base.limits import HEADER
 from langflash_core.errors import SceneFileError
 from langflash_core.geometry.quaternions import quats_to_matrices
-from langflash_core.limits import HEADER
 
 USHORT, UINT, FLOAT, ARRAY = 5123, 5125, 5126, 34962
 TYPES = {5120: "i1", 5121: "u1", 5122: "<i2", USHORT: "<u2", UINT: "<u4", FLOAT: "<f4"}

@@ -32,7 +32,9 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from langflash_core.colormaps import HEAT_STOPS
+from langflash_core.base.colormaps import HEAT_STOPS
+from langflash_core.base.files import write_atomically
+from langflash_core.base.graphics import shader_source
 from langflash_core.export.packing import check_some, morton_order
 from langflash_core.export.page_columns import (
     Column,
@@ -43,10 +45,8 @@ from langflash_core.export.page_columns import (
     weight_columns,
 )
 from langflash_core.export.png import DIM, GLOW
-from langflash_core.files import write_atomically
 from langflash_core.geometry.cameras import invert_rigid
 from langflash_core.geometry.poses import from_view
-from langflash_core.graphics import shader_source
 from langflash_core.scene.exposure import FAR, HERE, median_distance
 from langflash_core.scene.tour import Stop, read_tour
 from langflash_core.scene.world import turn_of

@@ -17,13 +17,13 @@ import safetensors.torch
 import torch
 from safetensors import SafetensorError
 
+from langflash_core.base.limits import ATOMS, VIEWS
 from langflash_core.export.packing import told
-from langflash_core.limits import ATOMS, VIEWS
-from langflash_core.scene.assemble import renormalised
 from langflash_core.scene.checks import check_scene
 from langflash_core.scene.container import in_order
 from langflash_core.scene.fields import to_fields
 from langflash_core.scene.record import from_json, to_json
+from langflash_core.scene.weights import renormalised
 from langflash_core.types import Gaussians, Scene, Semantics
 
 SIDE_CAR = ".language.safetensors"

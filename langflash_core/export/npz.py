@@ -5,8 +5,8 @@ from pathlib import Path
 
 import numpy as np
 
+from langflash_core.base.files import write_atomically
 from langflash_core.export.png import to_8bit
-from langflash_core.files import write_atomically
 from langflash_core.types import Camera, Frame, QueryResult, Semantics
 
 

@@ -11,9 +11,9 @@ import torch
 from PIL import Image
 from torch import Tensor
 
+from langflash_core.base.files import make_folder, write_atomically
 from langflash_core.export.colours import atom_colours, heat
 from langflash_core.export.png import to_8bit
-from langflash_core.files import make_folder, write_atomically
 from langflash_core.types import Frame
 
 Span = tuple[float, float]

@@ -16,6 +16,8 @@ from typing import BinaryIO
 
 import numpy as np
 
+from langflash_core.base.files import write_atomically
+from langflash_core.base.records import Shift
 from langflash_core.errors import SceneFileError
 from langflash_core.export.antialiased import filter_of, filtered, ply_comments, ply_model
 from langflash_core.export.language import packed_language, side_car, speaks, with_language
@@ -32,9 +34,7 @@ from langflash_core.export.ply_numbers import (
 )
 from langflash_core.export.ply_numbers import REMEDY as _REMEDY
 from langflash_core.export.stored import ANTIALIASED, ROWS_AT_ONCE, Gathering, Rows, logit, parts, to_scene
-from langflash_core.files import write_atomically
 from langflash_core.geometry.harmonics import MAX_SHOWN_DEGREE
-from langflash_core.records import Shift
 from langflash_core.types import Gaussians, Scene
 
 _NORMALS = ("nx", "ny", "nz")

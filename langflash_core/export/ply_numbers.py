@@ -15,11 +15,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.lib.recfunctions import structured_to_unstructured
 
+from langflash_core.base.records import Shift, told_shift
 from langflash_core.errors import SceneFileError
 from langflash_core.export.antialiased import filter_of
 from langflash_core.export.stored import Rows
 from langflash_core.geometry.harmonics import SH_C0
-from langflash_core.records import Shift, told_shift
 
 MEANS = ("x", "y", "z")
 DC = ("f_dc_0", "f_dc_1", "f_dc_2")

@@ -10,9 +10,9 @@ import torch
 from PIL import Image
 from torch import Tensor
 
-from langflash_core.colormaps import HeatColours
+from langflash_core.base.colormaps import HeatColours
+from langflash_core.base.files import write_atomically
 from langflash_core.export.colours import heat, label_colours
-from langflash_core.files import write_atomically
 from langflash_core.scene.gaps import filled
 from langflash_core.types import LUMA, Frame, QueryResult
 

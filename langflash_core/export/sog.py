@@ -23,14 +23,14 @@ import numpy as np
 import torch
 from PIL import Image
 
+from langflash_core.base.files import make_folder, write_atomically
+from langflash_core.base.formats import SOG_FOLDER
+from langflash_core.base.limits import FILES, GAUSSIANS
+from langflash_core.base.picture_files import opened_picture
 from langflash_core.errors import OutputError, SceneFileError
 from langflash_core.export.packing import check_some, from_smallest_three, morton_order, told
 from langflash_core.export.quantised import Palette, quantised
 from langflash_core.export.stored import ANTIALIASED, PLAIN, ROWS_AT_ONCE, Gathering, Rows, to_scene
-from langflash_core.files import make_folder, write_atomically
-from langflash_core.formats import SOG_FOLDER
-from langflash_core.limits import FILES, GAUSSIANS
-from langflash_core.picture_files import opened_picture
 from langflash_core.types import Scene
 
 _BOOK, _ROW = 256, 64  # numbers, entries a row of the palette's picture

@@ -10,9 +10,9 @@ from pathlib import Path
 
 import numpy as np
 
+from langflash_core.base.files import write_atomically
 from langflash_core.errors import SceneFileError
 from langflash_core.export.stored import ROWS_AT_ONCE, Gathering, Rows, parts, to_scene
-from langflash_core.files import write_atomically
 from langflash_core.geometry.harmonics import SH_C0
 from langflash_core.types import Gaussians, Scene
 

@@ -18,6 +18,8 @@ from pathlib import Path
 
 import numpy as np
 
+from langflash_core.base.files import write_atomically
+from langflash_core.base.formats import AXES
 from langflash_core.errors import OutputError, SceneFileError
 from langflash_core.export.packing import (
     MOST_SHRINKING,
@@ -31,8 +33,6 @@ from langflash_core.export.packing import (
     zstd_packed,
 )
 from langflash_core.export.stored import ANTIALIASED, PLAIN, ROWS_AT_ONCE, Gathering, Rows, parts, to_scene
-from langflash_core.files import write_atomically
-from langflash_core.formats import AXES
 from langflash_core.geometry.harmonics import MAX_SHOWN_DEGREE
 from langflash_core.geometry.turning import axes_matrix
 from langflash_core.scene.standing import on_its_head

@@ -10,10 +10,10 @@ from dataclasses import dataclass
 import numpy as np
 import torch
 
+from langflash_core.base.limits import GAUSSIANS
+from langflash_core.base.memory import free_memory
 from langflash_core.errors import SceneFileError
 from langflash_core.geometry.quaternions import unit_quats
-from langflash_core.limits import GAUSSIANS
-from langflash_core.memory import free_memory
 from langflash_core.scene.bare import bare_scene
 from langflash_core.types import Gaussians, Scene
 

@@ -17,18 +17,18 @@ from pathlib import Path
 
 import numpy as np
 
-from langflash_core.apart import Ended, Part, Refused, ask
+from langflash_core.base.apart import Ended, Part, Refused, ask
+from langflash_core.base.files import written_atomically
 from langflash_core.errors import OutputError, SceneFileError
 from langflash_core.export.colours import Encoding, encoding_of, with_srgb_colours
 from langflash_core.export.packing import check_some, placed, told, turned
 from langflash_core.export.stored import ROWS_AT_ONCE, Gathering, Rows, parts, to_scene
-from langflash_core.files import written_atomically
 from langflash_core.geometry.harmonics import MAX_SHOWN_DEGREE
 from langflash_core.geometry.turning import axes_matrix
 from langflash_core.types import Scene
 
 _AXES = {"Y": "RUB", "Z": "RFU"}  # by a stage's upAxis
-# The attributes that `langflash_core/apart/stages.py` reads, which imports OpenUSD.
+# The attributes that `langflash_core/base/apart/stages.py` reads, which imports OpenUSD.
 ARRAYS = ("positions", "orientations", "scales", "opacities")
 HARMONICS = "radiance:sphericalHarmonicsCoefficients"
 _SPACE = "srgb_rec709_scene"  # OpenUSD's own name of sRGB; it knows none of a display

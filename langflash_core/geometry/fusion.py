@@ -15,7 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float, Integer, UInt8
 
-from langflash_core.extras import optional_packages
+from langflash_core.base.optional import optional_packages
 
 BAND = (
     4.0  # voxels on either side of a surface that count: below 3 noise tears holes, above it thickens edges

@@ -1,7 +1,7 @@
 """Where the person stands: a pose to orbit, pan, zoom and fly with, as pure functions.
 
 Conventions of the core: OpenCV axes, world = camera of view 0, quaternions wxyz. Up is -y, because view 0
-was held roughly level, where nobody knows better (`langflash_core.records.World`). A pose frames a *box*
+was held roughly level, where nobody knows better (`langflash_core.base.records.World`). A pose frames a *box*
 with the shape of the photos inside a panel of any shape: the box always fits, so an input view shows all of
 its photo.
 

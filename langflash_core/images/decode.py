@@ -16,10 +16,10 @@ from pathlib import Path
 import numpy as np
 from PIL import Image, ImageCms
 
+from langflash_core.base.formats import is_film
+from langflash_core.base.limits import PIXELS, PROFILE
+from langflash_core.base.picture_files import TooManyPixels, opened_picture, picture_block
 from langflash_core.errors import ImageError
-from langflash_core.formats import is_film
-from langflash_core.limits import PIXELS, PROFILE
-from langflash_core.picture_files import TooManyPixels, opened_picture, picture_block
 
 MIN_SIDE = 32
 MID_GREY = (128, 128, 128, 255)

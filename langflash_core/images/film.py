@@ -1,6 +1,6 @@
 """A film as upright pictures with their times, one after another: never more than two are in memory.
 
-It is decoded in a process of its own (`langflash_core/apart/films.py`), which looks for the next picture
+It is decoded in a process of its own (`langflash_core/base/apart/films.py`), which looks for the next picture
 while the last one is judged here.
 """
 
@@ -13,9 +13,9 @@ from typing import Any
 import numpy as np
 from jaxtyping import UInt8
 
-from langflash_core.apart import Ended, Part, Refused, ask
+from langflash_core.base.apart import Ended, Part, Refused, ask
+from langflash_core.base.limits import PIXELS
 from langflash_core.errors import FilmError
-from langflash_core.limits import PIXELS
 
 LOOKS = 15.0  # pictures a second that are looked at, at most
 MIN_SIDE = 64  # pixels

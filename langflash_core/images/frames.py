@@ -17,8 +17,10 @@ from pathlib import Path
 
 import numpy as np
 
+from langflash_core.base.files import filled_atomically, write_atomically
+from langflash_core.base.resources import home_folder
+from langflash_core.base.running import Progress
 from langflash_core.errors import FilmError, OutputError
-from langflash_core.files import filled_atomically, write_atomically
 from langflash_core.images.film import Reader, opened
 from langflash_core.images.motion import (
     ALIKE,
@@ -49,8 +51,6 @@ from langflash_core.images.strip import (
     read_strip,
     written,
 )
-from langflash_core.resources import home_folder
-from langflash_core.running import Progress
 
 PIECE = 0.02  # of the side that the picture moves in a piece, of which one frame is kept
 RULER = 0.08  # of the side: who turns back where he goes on has gone so far, whose hand shakes has not

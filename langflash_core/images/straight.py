@@ -13,7 +13,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from langflash_core.records import FoundFocal
+from langflash_core.base.records import FoundFocal
 from langflash_core.types import Views
 
 _QUALITY = 95  # of JPEG: what was stored once already loses no more than it must

@@ -8,12 +8,12 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from langflash_core.base.picture_files import STORED, opened_picture
 from langflash_core.errors import InputError
 from langflash_core.images import triage
 from langflash_core.images.decode import PhotoFacts
 from langflash_core.images.lens import ASSUMED_FOV, Intrinsics, check_lens, known_lenses, photo_intrinsics
 from langflash_core.images.pictures import Box, Picture, photo_names, photo_paths, read_pictures
-from langflash_core.picture_files import STORED, opened_picture
 from langflash_core.types import Views
 
 

@@ -17,11 +17,11 @@ import numpy as np
 from jaxtyping import Float
 from scipy.spatial.transform import Rotation
 
+from langflash_core.base.picture_files import STORED, opened_picture
 from langflash_core.errors import InputError
 from langflash_core.geometry.cameras import invert_rigid
 from langflash_core.inventory.things import Inventory
 from langflash_core.language.answers import COVERED_ALPHA
-from langflash_core.picture_files import STORED, opened_picture
 from langflash_core.scene.world import turn_of
 from langflash_core.types import Camera, Frame
 

@@ -17,8 +17,8 @@ from jaxtyping import Float
 from scipy.ndimage import gaussian_filter1d
 from scipy.spatial import KDTree
 
+from langflash_core.base.records import Guess
 from langflash_core.inventory.things import OPENINGS, Inventory, Thing, kinds_of
-from langflash_core.records import Guess
 from langflash_core.scene.standing import normals_of
 from langflash_core.scene.thin import covered_areas
 from langflash_core.scene.world import turn_of

@@ -6,7 +6,7 @@ has a height and a rectangle on the floor, along the walls unless another turn s
 Sizes are those of what photos saw: the back of a cupboard that nobody saw is not measured.
 
 Lengths are metres where the scene's scale is known or guessed, else scene units. World: +x east, +y down,
-+z north, the floor at y = 0 (`langflash_core.records.World`). Sizes: N Gaussians, G kinds, V views.
++z north, the floor at y = 0 (`langflash_core.base.records.World`). Sizes: N Gaussians, G kinds, V views.
 """
 
 import itertools
@@ -21,9 +21,9 @@ import torch
 from jaxtyping import Bool, Float, Integer
 from torch import Tensor
 
+from langflash_core.base.records import Guess, World
 from langflash_core.errors import InputError
 from langflash_core.export import opened
-from langflash_core.fused import fused_rows, told_in_layers
 from langflash_core.inventory.pieces import STRUCTURE, Parts, parts_of_room
 from langflash_core.language.answers import BOX_QUANTILES
 from langflash_core.language.gaussians import gaussian_relevance
@@ -31,10 +31,10 @@ from langflash_core.language.relevance import compile_query
 from langflash_core.language.spaces import language_space
 from langflash_core.language.vocabulary import OWN
 from langflash_core.level import found_world, metres_of
-from langflash_core.records import Guess, World
 from langflash_core.scene.thin import covered_areas
 from langflash_core.scene.world import turn_of
 from langflash_core.segments import evenly, photo_shares
+from langflash_core.surface.fused import fused_rows, told_in_layers
 from langflash_core.types import Scene, Segments
 
 OPENINGS = ("door", "window")

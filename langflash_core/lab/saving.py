@@ -4,7 +4,7 @@ from pathlib import Path
 
 import torch
 
-from langflash_core.files import written_atomically
+from langflash_core.base.files import written_atomically
 
 
 def save_whole(content: object, path: Path) -> None:

@@ -27,11 +27,11 @@ from safetensors import SafetensorError
 from torch import Tensor
 from torch.nn.functional import normalize
 
+from langflash_core.base.files import written_atomically
+from langflash_core.base.optional import optional_packages
+from langflash_core.base.resources import weights_folder
+from langflash_core.base.torchvision_fix import ensure_torchvision
 from langflash_core.errors import PromptError, WeightsError
-from langflash_core.extras import optional_packages
-from langflash_core.files import written_atomically
-from langflash_core.resources import weights_folder
-from langflash_core.torchvision_fix import ensure_torchvision
 
 DIMENSION = 512
 ARCHITECTURE = "ViT-B-32-quickgelu"  # OpenAI's weights were trained with the approximate GELU

@@ -17,10 +17,10 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
+from langflash_core.base.files import readable_file, write_atomically
+from langflash_core.base.limits import TEXT
+from langflash_core.base.records import Record
 from langflash_core.errors import PromptError
-from langflash_core.files import readable_file, write_atomically
-from langflash_core.limits import TEXT
-from langflash_core.records import Record
 
 SAME = 0.85
 """Cosine of looks from which groups of two scenes are taken for the same kind of thing."""

@@ -21,9 +21,9 @@ from tokenizers import Tokenizer
 from torch import Tensor, nn
 from torch.nn.functional import normalize
 
+from langflash_core.base.resources import asset_path
+from langflash_core.base.shipped import check_shipped
 from langflash_core.errors import PromptError, WeightsError
-from langflash_core.resources import asset_path
-from langflash_core.shipped import check_shipped
 
 DIMENSION = 384
 MAX_TOKENS = 256  # the model's declared maximum; longer phrases are cut

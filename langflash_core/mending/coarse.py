@@ -22,14 +22,14 @@ from torch.nn.functional import normalize
 
 from langflash_core.geometry.harmonics import SH_C0, colour_to_sh
 from langflash_core.geometry.quaternions import matrices_to_quats
-from langflash_core.scene.assemble import renormalised, sparse_weights
 from langflash_core.scene.thin import covered_areas
+from langflash_core.scene.weights import renormalised, sparse_weights
 from langflash_core.types import Gaussians, Scene, Semantics
 
 LEVELS = 16  # of a colour
 OPACITY = 0.99
 _PLACES = 8  # that a block's side is parted into
-_COVER = 0.85  # deviation of a Gaussian over its spacing: closed (scene/elements.py)
+_COVER = 0.85  # deviation of a Gaussian over its spacing: closed (surface/elements.py)
 _THIN = 0.1
 _TILES = 6  # along the side of a block
 _AROUND = 8  # blocks that run into each other

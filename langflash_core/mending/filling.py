@@ -28,9 +28,9 @@ from langflash_core.geometry.harmonics import colour_to_sh
 from langflash_core.geometry.quaternions import matrices_to_quats
 from langflash_core.geometry.surfels import ellipses, spans
 from langflash_core.rig.projected import project_points
-from langflash_core.scene.assemble import sparse_weights
-from langflash_core.scene.exposure_compensation import GAIN_RANGE, LARGEST_OFFSET
 from langflash_core.scene.joining import appended
+from langflash_core.scene.weights import sparse_weights
+from langflash_core.surface.exposure_compensation import GAIN_RANGE, LARGEST_OFFSET
 from langflash_core.types import Camera, Gaussians, Scene
 
 from .looks import Render, mattes

@@ -24,7 +24,7 @@ from langflash_core.errors import InputError
 from langflash_core.rig.projected import project_points
 from langflash_core.scene.instances import instances
 from langflash_core.scene.joining import appended
-from langflash_core.scene.prune import sparser
+from langflash_core.surface.prune import sparser
 from langflash_core.types import Camera, Scene
 
 from .coarse import coarsened

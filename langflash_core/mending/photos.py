@@ -15,8 +15,8 @@ import numpy as np
 from jaxtyping import Bool, Float, UInt8
 from PIL import Image
 
+from langflash_core.base.picture_files import STORED, opened_picture
 from langflash_core.errors import SceneFileError
-from langflash_core.picture_files import STORED, opened_picture
 from langflash_core.scene.exposure import lit_camera
 from langflash_core.scene.gaps import filled
 from langflash_core.types import Camera, Scene

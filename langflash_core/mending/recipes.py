@@ -17,9 +17,9 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from langflash_core.base.files import write_atomically
+from langflash_core.base.limits import TEXT
 from langflash_core.errors import InputError
-from langflash_core.files import write_atomically
-from langflash_core.limits import TEXT
 
 FORMAT, VERSION = "langflash-recipe", 1
 HOWS = ("blur", "pixels", "remove")

@@ -1,7 +1,7 @@
 """Photos to a `Prediction`: encoder, geometry, Gaussians, language, grouping, aggregation.
 
 The names below are read in at first use: what of this package needs no torch (`presets`,
-`stereo.keypoints`, `checkpoints.stored`) works before torch is there.
+`checkpoints.stored`) works before torch is there.
 """
 
 from importlib import import_module
@@ -19,7 +19,6 @@ if TYPE_CHECKING:
     from langflash_core.network.presets import MINI as MINI
     from langflash_core.network.presets import PRESETS as PRESETS
     from langflash_core.network.presets import Preset as Preset
-    from langflash_core.network.stereo.pairs import choose_pair as choose_pair
 
 _HOMES = {
     "build_network": "build",
@@ -33,7 +32,6 @@ _HOMES = {
     "MINI": "presets",
     "PRESETS": "presets",
     "Preset": "presets",
-    "choose_pair": "stereo.pairs",
 }
 
 

@@ -16,7 +16,8 @@ from langflash_core.geometry.surfels import ellipses, spans
 from langflash_core.network.layers.dpt import DPT
 from langflash_core.network.occlusion import drawn_back, extended, over_edges
 from langflash_core.network.presets import Preset
-from langflash_core.network.stereo.prior import DepthMaps, resize
+from langflash_core.network.prior import resize
+from langflash_core.rig.rig import DepthMaps
 from langflash_core.types import Gaussians
 
 _COVER = 0.6  # standard deviation in pixel spacings: neighbours blend into a closed surface

@@ -11,16 +11,28 @@ from jaxtyping import Float
 from torch import Tensor
 from torch.nn import functional as F
 
-from langflash_core.memory import give_back
+from langflash_core.base.many import FEW, groups_of, held, together
+from langflash_core.base.memory import give_back
+from langflash_core.base.running import Run
+from langflash_core.cameras.poses import Poses
+from langflash_core.cameras.retrieval import most_alike
+from langflash_core.cameras.structure import (
+    find_poses,
+    found_lenses,
+    is_other_lens,
+    placed_rig,
+    rescale_poses,
+)
+from langflash_core.depth.surfaces import one_by_one, one_surface
 from langflash_core.network.encoders.late import LateHalf, with_taught
 from langflash_core.network.encoders.local import LocalFeatures
 from langflash_core.network.encoders.others import OtherEyes
 from langflash_core.network.encoders.shared import Encoder, Tokens, tokens_to_maps
 from langflash_core.network.gaussians import GaussianHead, assemble_gaussians
 from langflash_core.network.layers.decoder import SiameseDecoder, TwoStackDecoder
-from langflash_core.network.many import FEW, groups_of, held, together
 from langflash_core.network.model import MEANING_STAGES, Geometry, LangFlashNet, Seen
 from langflash_core.network.presets import GuidedDepth
+from langflash_core.network.prior import DepthHead
 from langflash_core.network.semantics.aggregation import Aggregation
 from langflash_core.network.semantics.features import LanguageHead
 from langflash_core.network.semantics.grouping import (
@@ -33,21 +45,9 @@ from langflash_core.network.semantics.grouping import (
 from langflash_core.network.semantics.naming import PartNamer, describe, places
 from langflash_core.network.semantics.second import SecondHead, both, looked_at
 from langflash_core.network.semantics.splitting import condensed, joint_maps, split_groups, split_maps
-from langflash_core.network.stereo.cameras import (
-    find_poses,
-    found_lenses,
-    is_other_lens,
-    placed_rig,
-    rescale_poses,
-)
-from langflash_core.network.stereo.poses import Poses
-from langflash_core.network.stereo.prior import DepthHead, DepthMaps
-from langflash_core.network.stereo.retrieval import most_alike
-from langflash_core.network.stereo.surfaces import one_by_one, one_surface
-from langflash_core.network.stereo.sweep import DepthRefiner
+from langflash_core.network.sweep import DepthRefiner
 from langflash_core.rig.neighbours import source_views
-from langflash_core.rig.rig import Rig
-from langflash_core.running import Run
+from langflash_core.rig.rig import DepthMaps, Rig
 from langflash_core.types import Gaussians, Views
 
 _READ = 15  # photos that each of many reads in the decoder

@@ -12,15 +12,15 @@ import torch
 from jaxtyping import Float
 from torch import Tensor, nn
 
+from langflash_core.base.keeping import not_kept
+from langflash_core.base.many import in_groups
+from langflash_core.base.records import FoundFocal
+from langflash_core.base.running import Kept, Progress, Run, evenly
 from langflash_core.errors import WeightsError
-from langflash_core.keeping import not_kept
 from langflash_core.network.encoders.shared import Tokens
-from langflash_core.network.many import in_groups
 from langflash_core.network.presets import Preset
 from langflash_core.network.semantics.aggregation import Aggregation, averaged_atoms
 from langflash_core.network.semantics.grouping import Groups
-from langflash_core.records import FoundFocal
-from langflash_core.running import Kept, Progress, Run, evenly
 from langflash_core.types import FoundLens, Gaussians, Prediction, Views
 
 Atoms = Callable[[Tensor, Tensor], Tensor]

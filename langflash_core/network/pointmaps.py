@@ -8,6 +8,7 @@ import torch
 from jaxtyping import Float
 from torch import Tensor, nn
 
+from langflash_core.base.running import Run
 from langflash_core.network.encoders.lseg import LSeg
 from langflash_core.network.encoders.shared import Tokens
 from langflash_core.network.encoders.vit import RotaryEncoder
@@ -20,7 +21,6 @@ from langflash_core.network.semantics.aggregation import Aggregation
 from langflash_core.network.semantics.grouping import group_weights, surviving
 from langflash_core.network.semantics.residual import ResidualGrouping, ScratchPair, filtered
 from langflash_core.network.semantics.splitting import split_groups
-from langflash_core.running import Run
 from langflash_core.types import Views
 
 

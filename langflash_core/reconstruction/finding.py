@@ -8,16 +8,16 @@ from pathlib import Path
 import torch
 from torch import Tensor
 
-from langflash_core.ahead import Ahead
+from langflash_core.base.keeping import Keep, not_kept
+from langflash_core.base.running import Kept, Run
 from langflash_core.errors import WeightsError
-from langflash_core.keeping import Keep, not_kept
-from langflash_core.kept_prediction import arrays_of, prediction_of
 from langflash_core.network import PRESETS
 from langflash_core.network.checkpoints.parts import part_folder
 from langflash_core.network.checkpoints.stored import weights_file
+from langflash_core.reconstruction.ahead import Ahead
+from langflash_core.reconstruction.kept_prediction import arrays_of, prediction_of
 from langflash_core.reconstruction.options import Options
 from langflash_core.reconstruction.tools import Tools
-from langflash_core.running import Kept, Run
 from langflash_core.types import Prediction, Views
 
 

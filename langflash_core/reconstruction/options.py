@@ -8,7 +8,7 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
-from langflash_core.detail import DEFAULT_DETAIL, check_gaussians, chosen_detail
+from langflash_core.base.detail import DEFAULT_DETAIL, check_gaussians, chosen_detail
 from langflash_core.errors import InputError
 from langflash_core.images.lens import Intrinsics
 

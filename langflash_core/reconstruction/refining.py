@@ -5,10 +5,10 @@ from dataclasses import replace
 from jaxtyping import Float
 from torch import Tensor
 
+from langflash_core.base.running import Progress
 from langflash_core.errors import InputError
-from langflash_core.fused import fused
-from langflash_core.running import Progress
 from langflash_core.splat.refine import Budget, refine
+from langflash_core.surface.fused import fused
 from langflash_core.types import Scene
 
 

@@ -10,23 +10,23 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
-from langflash_core.ahead import Ahead, begin
-from langflash_core.detail import DEFAULT_DETAIL
-from langflash_core.fine import coloured_scene, covered_scene
+from langflash_core.base.detail import DEFAULT_DETAIL
+from langflash_core.base.memory import peak_memory_mb
+from langflash_core.base.running import Run
 from langflash_core.images.triage import check_shown
 from langflash_core.images.views import load_views
 from langflash_core.level import levelled
-from langflash_core.memory import peak_memory_mb
+from langflash_core.reconstruction.ahead import Ahead, begin
 from langflash_core.reconstruction.finding import predictor
 from langflash_core.reconstruction.networks import Networks
 from langflash_core.reconstruction.options import Options
 from langflash_core.reconstruction.refining import refined
 from langflash_core.reconstruction.tools import Tools, open_tools
 from langflash_core.reconstruction.views import found_views, posed_views, straight_prediction
-from langflash_core.running import Run
-from langflash_core.scene.assemble import assemble
-from langflash_core.scene.prune import prune
 from langflash_core.scene.world import in_world
+from langflash_core.surface.assemble import assemble
+from langflash_core.surface.fine import coloured_scene, covered_scene
+from langflash_core.surface.prune import prune
 from langflash_core.types import Cost, FoundLens, Prediction, Scene, Views
 
 # Where each begins in the whole, from its measured share of the time on two CPU cores.

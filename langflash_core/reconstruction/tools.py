@@ -6,7 +6,7 @@ from pathlib import Path
 
 from torch import Tensor
 
-from langflash_core.detail import Detail, chosen_detail
+from langflash_core.base.detail import Detail, chosen_detail
 from langflash_core.errors import InputError, WeightsError
 from langflash_core.images.views import source_pictures
 from langflash_core.language.clip import load_clip_images

@@ -29,6 +29,23 @@ def confidences_of(log_errors: Float[Tensor, "*n"]) -> Float[Tensor, "*n"]:
 
 
 @dataclass(frozen=True)
+class DepthMaps:
+    """log_depths and log_errors (..., H, W): log z, and log b of its expected error."""
+
+    log_depths: Float[Tensor, "... H W"]
+    log_errors: Float[Tensor, "... H W"]
+
+    @property
+    def depths(self) -> Float[Tensor, "... H W"]:
+        return self.log_depths.exp()
+
+    @property
+    def confidences(self) -> Float[Tensor, "... H W"]:
+        """1 / (1 + b / `CONFIDENT_ERROR`), in (0, 1)."""
+        return confidences_of(self.log_errors)
+
+
+@dataclass(frozen=True)
 class Rig:
     """viewmats: world to camera, OpenCV axes, in any unit. Ks: pixels of the depth maps. depths: z > 0, in
     that unit. confidences: in [0, 1]; None: nobody asks. photos: in [0, 1], sRGB; None: nobody looks at them.

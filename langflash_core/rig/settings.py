@@ -8,7 +8,7 @@ from dataclasses import dataclass
 
 @dataclass(frozen=True)
 class Agreement:
-    """Depth maps that are bent and blended until they agree (`network.stereo.agreement`)."""
+    """Depth maps that are bent and blended until they agree (`depth.agreement`)."""
 
     knots: int = 5
     """Of a correction, a side: slower than that no map errs."""
@@ -33,7 +33,7 @@ AGREEMENT = Agreement()
 
 @dataclass(frozen=True)
 class Registration:
-    """Depth from what optical flow finds shifted (`network.stereo.registration`)."""
+    """Depth from what optical flow finds shifted (`depth.registration`)."""
 
     largest: int = 3
     """Times the maps' size, at which photos are compared."""
@@ -84,7 +84,7 @@ REGISTRATION = Registration()
 
 @dataclass(frozen=True)
 class PlaneSweep:
-    """Things that depth maps have missed (`network.stereo.planesweep`)."""
+    """Things that depth maps have missed (`depth.planesweep`)."""
 
     planes: int = 48
     """Hypotheses in equal steps of inverse depth."""
@@ -115,7 +115,7 @@ PLANE_SWEEP = PlaneSweep()
 
 @dataclass(frozen=True)
 class Flattening:
-    """Surfaces that are flat as far as anybody can tell (`network.stereo.planes`)."""
+    """Surfaces that are flat as far as anybody can tell (`depth.planes`)."""
 
     radii: tuple[int, int, int, int] = (2, 4, 8, 14)
     """Of the windows, in pixels of maps of half the size, where a token has 7: the largest is four tokens."""
@@ -132,7 +132,7 @@ FLATTENING = Flattening()
 
 @dataclass(frozen=True)
 class Sharpening:
-    """Edges of depth where the photo has them (`network.stereo.sharpening`)."""
+    """Edges of depth where the photo has them (`depth.sharpening`)."""
 
     reach: int = 12
     """Pixels: as far as a map smears an edge, 16 pixels a token."""
@@ -196,7 +196,7 @@ CHOICE = Choice()
 
 @dataclass(frozen=True)
 class Straightening:
-    """Monocular depth that matches straighten (`network.stereo.alignment`)."""
+    """Monocular depth that matches straighten (`cameras.alignment`)."""
 
     prior_error: float = 0.08
     """Log-depth error that no smooth correction removes."""
@@ -213,7 +213,7 @@ STRAIGHTENING = Straightening()
 
 @dataclass(frozen=True)
 class Graph:
-    """Relative poses of pairs brought together (`network.stereo.graph`)."""
+    """Relative poses of pairs brought together (`cameras.graph`)."""
 
     sources: int = 4
     """Of each photo, whose pairs are looked at."""
@@ -234,7 +234,7 @@ GRAPH = Graph()
 
 @dataclass(frozen=True)
 class Adjustment:
-    """All photos and lenses adjusted together (`network.stereo.adjustment`)."""
+    """All photos and lenses adjusted together (`cameras.adjustment`)."""
 
     observations: tuple[int, int] = (150, 400)
     """Of each view, in the first round and in the second: more change nothing but the time."""
@@ -265,7 +265,7 @@ ADJUSTMENT = Adjustment()
 
 @dataclass(frozen=True)
 class Pairing:
-    """Poses of pairs, and which photos tell a lens first (`network.stereo.poses`)."""
+    """Poses of pairs, and which photos tell a lens first (`cameras.poses`)."""
 
     min_share: float = 0.25
     """Of the matches, that must agree with a pose."""

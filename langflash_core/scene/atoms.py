@@ -9,7 +9,7 @@ from jaxtyping import Float, UInt8
 from PIL import Image
 from torch.nn.functional import normalize
 
-from langflash_core.picture_files import STORED, opened_picture
+from langflash_core.base.picture_files import STORED, opened_picture
 from langflash_core.rig.projected import project_points
 from langflash_core.scene.selection import strongest_atoms
 from langflash_core.scene.thin import covered_areas

@@ -15,9 +15,9 @@ import safetensors.numpy
 from jaxtyping import Shaped
 from safetensors import SafetensorError
 
+from langflash_core.base.files import write_atomically
+from langflash_core.base.limits import ATOMS, GAUSSIANS, HEADER, VIEWS
 from langflash_core.errors import SceneFileError
-from langflash_core.files import write_atomically
-from langflash_core.limits import ATOMS, GAUSSIANS, HEADER, VIEWS
 
 FORMAT, VERSION = "langflash-scene", 3
 _REMEDY = "reconstruct the scene again or copy the whole file"

@@ -9,7 +9,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
-from langflash_core.records import Record
+from langflash_core.base.records import Record
 
 TORN = 0.65
 """Likeness of a photo's edges to what its neighbours foresee (`foreseen`), below which they do not meet. Of

@@ -15,7 +15,7 @@ from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
 from typing import Any, Literal
 
-from langflash_core.records import World
+from langflash_core.base.records import World
 from langflash_core.scene.changes import Change, with_change
 from langflash_core.scene.mask import Mask
 

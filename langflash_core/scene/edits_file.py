@@ -22,10 +22,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+from langflash_core.base.files import write_atomically
+from langflash_core.base.limits import TEXT
+from langflash_core.base.records import World, world_from_json, world_to_json
 from langflash_core.errors import SceneFileError
-from langflash_core.files import write_atomically
-from langflash_core.limits import TEXT
-from langflash_core.records import World, world_from_json, world_to_json
 from langflash_core.scene.changes import Change, checked, told
 from langflash_core.scene.edited import first_marks
 from langflash_core.scene.edits import MASKS, TOLD, Atom, Edit, History, difference

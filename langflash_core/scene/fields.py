@@ -12,7 +12,7 @@ from jaxtyping import Shaped
 from torch import Tensor
 from torch.nn.functional import normalize
 
-from langflash_core.scene.assemble import renormalised
+from langflash_core.scene.weights import renormalised
 from langflash_core.types import Gaussians, Record, Scene, Semantics
 
 REQUIRED = (

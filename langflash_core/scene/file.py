@@ -19,8 +19,8 @@ import safetensors.torch
 import torch
 from torch import Tensor
 
-from langflash_core.files import write_atomically
-from langflash_core.memory import out_of_memory
+from langflash_core.base.files import write_atomically
+from langflash_core.base.memory import out_of_memory
 from langflash_core.scene.checks import check_scene
 from langflash_core.scene.container import FORMAT, VERSION, damaged, digest, in_order, read_container
 from langflash_core.scene.fields import NEWER, from_fields, to_fields

@@ -7,7 +7,7 @@ read into `Record.others` and written back as they are.
 
 import math
 
-from langflash_core.records import Cost, Record, Shift, world_from_json, world_to_json
+from langflash_core.base.records import Cost, Record, Shift, world_from_json, world_to_json
 from langflash_core.scene.tour import read_tour, told_tour
 
 _COST = ("timings", "seconds", "peak_memory_mb")

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from langflash_core.records import FoundLens, Guess, Record, World, check_light, world_to_json
+from langflash_core.base.records import FoundLens, Guess, Record, World, check_light, world_to_json
 from langflash_core.scene.container import damaged, read_container
 from langflash_core.scene.doubts import told_warnings
 from langflash_core.scene.record import from_json

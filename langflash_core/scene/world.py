@@ -9,11 +9,11 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
+from langflash_core.base.records import World
 from langflash_core.geometry import rotations
 from langflash_core.geometry.cameras import invert_rigid, transform
 from langflash_core.geometry.poses import Vector, read_pose, told_pose
 from langflash_core.geometry.turning import turned_quats, turned_sh
-from langflash_core.records import World
 from langflash_core.scene.tour import read_tour, told_tour
 from langflash_core.types import Gaussians, Scene
 

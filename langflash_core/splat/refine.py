@@ -19,8 +19,8 @@ from jaxtyping import Bool, Float
 from torch import Tensor
 from torch.nn.functional import normalize
 
+from langflash_core.base.running import Progress
 from langflash_core.errors import InputError
-from langflash_core.running import Progress
 from langflash_core.splat.projection import NEAR, view_colours
 from langflash_core.splat.reference import rasterize
 from langflash_core.types import Camera, Gaussians, Scene

@@ -8,13 +8,13 @@ from collections.abc import Callable
 from contextlib import AbstractContextManager
 from pathlib import Path
 
+from langflash_core.base.files import check_folder, check_output_file, check_same_kind
+from langflash_core.base.formats import kind_of
+from langflash_core.base.outputs import ALL_OUT, PLY, SCENE, Output, loaded
+from langflash_core.base.records import told_shift
+from langflash_core.base.request import ExportRequest
+from langflash_core.base.running import Progress
 from langflash_core.export import opened
-from langflash_core.files import check_folder, check_output_file, check_same_kind
-from langflash_core.formats import kind_of
-from langflash_core.outputs import ALL_OUT, PLY, SCENE, Output, loaded
-from langflash_core.records import told_shift
-from langflash_core.request import ExportRequest
-from langflash_core.running import Progress
 from langflash_core.types import Scene
 from langflash_core.writing.cameras import CameraChoice, chosen_camera
 from langflash_core.writing.films import check_encoder

@@ -7,9 +7,9 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any
 
+from langflash_core.base.files import make_folder, write_atomically
 from langflash_core.export import glb
 from langflash_core.export.answers import answer_fields
-from langflash_core.files import make_folder, write_atomically
 from langflash_core.types import QueryResult, Scene
 from langflash_core.writing.job import Job
 

@@ -9,12 +9,12 @@ from typing import Any
 import numpy as np
 import torch
 
+from langflash_core.base.files import readable_file
+from langflash_core.base.formats import LARGEST_SIDE
+from langflash_core.base.limits import TEXT
+from langflash_core.base.picture_files import STORED, opened_picture
 from langflash_core.errors import ViewError
-from langflash_core.files import readable_file
-from langflash_core.formats import LARGEST_SIDE
 from langflash_core.geometry.reach import median_reach
-from langflash_core.limits import TEXT
-from langflash_core.picture_files import STORED, opened_picture
 from langflash_core.scene.exposure import lit_camera
 from langflash_core.types import Camera, Scene
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from langflash_core import pipeline
-from langflash_core.colormaps import HeatColours
+from langflash_core.base.colormaps import HeatColours
 from langflash_core.export import paint
 from langflash_core.export.colours import label_colours
 from langflash_core.export.png import USUAL, heat_over, label_picture, to_8bit

@@ -13,10 +13,12 @@ import torch
 from jaxtyping import Float
 
 from langflash_core import pipeline
-from langflash_core.colormaps import HeatColours
+from langflash_core.base.colormaps import HeatColours
+from langflash_core.base.files import readable_file, staged_folder
+from langflash_core.base.limits import TEXT
+from langflash_core.base.running import Progress
 from langflash_core.errors import InputError, ViewError
 from langflash_core.export.png import USUAL, heat_over, to_8bit
-from langflash_core.files import readable_file, staged_folder
 from langflash_core.geometry.poses import (
     UP,
     Pose,
@@ -35,8 +37,6 @@ from langflash_core.geometry.tours import RATE, along, even
 from langflash_core.language.relevance import CompiledQuery
 from langflash_core.language.spaces import language_space
 from langflash_core.language.spoken import compile_spoken
-from langflash_core.limits import TEXT
-from langflash_core.running import Progress
 from langflash_core.scene.exposure import lit_camera
 from langflash_core.scene.tour import read_tour
 from langflash_core.scene.world import turn_of

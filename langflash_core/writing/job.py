@@ -6,12 +6,12 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from langflash_core import pipeline
-from langflash_core.colormaps import HeatColours
+from langflash_core.base.colormaps import HeatColours
+from langflash_core.base.files import check_beside, check_output_file
+from langflash_core.base.outputs import Output
+from langflash_core.base.request import ExportRequest
+from langflash_core.base.running import Progress
 from langflash_core.errors import PromptError
-from langflash_core.files import check_beside, check_output_file
-from langflash_core.outputs import Output
-from langflash_core.request import ExportRequest
-from langflash_core.running import Progress
 from langflash_core.types import Camera, PromptAnswer, QueryResult, Scene
 from langflash_core.writing.cameras import CameraChoice
 from langflash_core.writing.renderers import Renderer, Shown

@@ -2,12 +2,12 @@
 
 from pathlib import Path
 
+from langflash_core.base.files import make_folder, staged_folder
+from langflash_core.base.outputs import INSTANCES, SOFT, Output
 from langflash_core.errors import PromptError
 from langflash_core.export import glb
 from langflash_core.export.paint import write_picture
 from langflash_core.export.png import write_grey, write_labels
-from langflash_core.files import make_folder, staged_folder
-from langflash_core.outputs import INSTANCES, SOFT, Output
 from langflash_core.types import SegmentedView
 from langflash_core.writing.job import Job
 from langflash_core.writing.subject import Subject, counted, cut_out, surfaces, taken_apart, views_of

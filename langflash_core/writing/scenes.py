@@ -5,16 +5,16 @@ from pathlib import Path
 from torch import Tensor
 
 from langflash_core import pipeline
+from langflash_core.base.files import make_folder
+from langflash_core.base.formats import SOG_FOLDER, kind_of
+from langflash_core.base.outputs import GLB, OPEN_USD, PLY, SCENE, SPLAT, loaded
 from langflash_core.errors import InputError
 from langflash_core.export import read
 from langflash_core.export.language import side_car
 from langflash_core.export.sog import sog_files
-from langflash_core.files import make_folder
-from langflash_core.formats import SOG_FOLDER, kind_of
-from langflash_core.fused import fused
 from langflash_core.level import upright
-from langflash_core.outputs import GLB, OPEN_USD, PLY, SCENE, SPLAT, loaded
 from langflash_core.scene.thin import coarse_level
+from langflash_core.surface.fused import fused
 from langflash_core.types import Scene
 from langflash_core.writing.job import Job
 

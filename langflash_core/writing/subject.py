@@ -11,8 +11,8 @@ from langflash_core import segments
 from langflash_core.errors import PromptError
 from langflash_core.export import depth
 from langflash_core.export.answers import file_names, scaled_box
-from langflash_core.fused import fused_rows
 from langflash_core.geometry.fusion import Surface
+from langflash_core.surface.fused import fused_rows
 from langflash_core.types import Camera, Scene, SegmentedView, Segments
 from langflash_core.writing.renderers import Renderer
 

@@ -18,11 +18,11 @@ from jaxtyping import Float
 from PIL import Image
 from torch import Tensor
 
-from langflash_core.colormaps import HeatColours
+from langflash_core.base.colormaps import HeatColours
+from langflash_core.base.files import make_folder, write_atomically
 from langflash_core.errors import InputError
 from langflash_core.export.answers import answer_fields, file_names
 from langflash_core.export.png import USUAL, heat_over
-from langflash_core.files import make_folder, write_atomically
 from langflash_core.language.relevance import Mode
 from langflash_core.pipeline import query
 from langflash_core.types import Camera, Frame, PromptAnswer, QueryResult, Scene

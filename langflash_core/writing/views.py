@@ -5,13 +5,13 @@ from pathlib import Path
 
 import numpy as np
 
+from langflash_core.base.files import make_folder, staged_folder
+from langflash_core.base.outputs import LABELS, MASK
 from langflash_core.export import depth
 from langflash_core.export.coco import write_coco
 from langflash_core.export.npz import write_npz, write_view
 from langflash_core.export.paint import write_picture
 from langflash_core.export.png import heat_over, label_map, to_8bit, write_labels, write_mask, write_rgb
-from langflash_core.files import make_folder, staged_folder
-from langflash_core.outputs import LABELS, MASK
 from langflash_core.types import Camera, QueryResult
 from langflash_core.writing.job import Answers, Job, check_found, kept_of
 

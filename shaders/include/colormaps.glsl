@@ -1,5 +1,5 @@
 // Purpose: a colour map of t in [0, 1], linear between evenly spaced stops.
-// Source: langflash_core/colormaps.py, which also draws files with them; STOPS is set by the program.
+// Source: langflash_core/base/colormaps.py, which also draws files with them; STOPS is set by the program.
 
 uniform vec3 colour_stops[STOPS];
 

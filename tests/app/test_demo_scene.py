@@ -11,9 +11,9 @@ import torch
 
 import langflash_core as lf
 from app.gl import SplatRenderer, offscreen_context
+from langflash_core.base.resources import asset_path
 from langflash_core.language.relevance import compile_query, relevance_maps
 from langflash_core.language.spaces import language_space
-from langflash_core.resources import asset_path
 from langflash_core.splat import render
 from langflash_core.types import Scene
 

@@ -6,9 +6,9 @@ import time
 from contextlib import contextmanager
 from pathlib import Path
 
+from langflash_core.base.files import filled_atomically
 from langflash_core.batch.dispatch import Job, Made
 from langflash_core.batch.run import SCENE
-from langflash_core.files import filled_atomically
 
 
 def trace(photo: Path) -> Path:

@@ -12,7 +12,7 @@ from PIL import Image
 
 import langflash_core as lf
 from langflash_core import pipeline
-from langflash_core.resources import asset_path
+from langflash_core.base.resources import asset_path
 from tests.export.browser import Browser, browser
 
 GAP = 16  # pixels

@@ -14,11 +14,11 @@ from hypothesis import HealthCheck, Phase, given, settings
 from hypothesis import strategies as st
 from torch.nn.functional import normalize
 
+from langflash_core.base.outputs import DROPPED, SCENES_IN, SCENES_OUT
 from langflash_core.errors import OutputError, SceneFileError
 from langflash_core.export import READERS, WRITERS, export, read, spz
 from langflash_core.export.packing import morton_order
 from langflash_core.geometry.harmonics import SH_C0, sh_to_colour
-from langflash_core.outputs import DROPPED, SCENES_IN, SCENES_OUT
 from langflash_core.scene.bare import bare_scene
 from langflash_core.scene.checks import check_scene
 from langflash_core.types import Gaussians

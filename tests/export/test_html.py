@@ -10,6 +10,7 @@ import pytest
 import torch
 
 from langflash_core import pipeline
+from langflash_core.base.resources import asset_path
 from langflash_core.errors import InputError, OutputError, PromptError
 from langflash_core.export import export
 from langflash_core.export.html import LAYERED, READING, SCRIPTS, Phrases, write_html
@@ -19,7 +20,6 @@ from langflash_core.language.answers import COVERED_ALPHA, MIN_AREA, TOP_FRACTIO
 from langflash_core.language.relevance import EMPTY_NORM, compile_query
 from langflash_core.language.spaces import language_space
 from langflash_core.language.vocabulary import all_phrases
-from langflash_core.resources import asset_path
 from langflash_core.scene.bare import bare_scene
 from langflash_core.scene.tour import Note, Stop, Tour, told_tour
 from langflash_core.splat.projection import NEAR

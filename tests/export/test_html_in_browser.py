@@ -16,12 +16,12 @@ from torch.nn.functional import normalize
 
 import langflash_core as lf
 from langflash_core import pipeline
+from langflash_core.base.resources import asset_path
 from langflash_core.export.html import write_html
 from langflash_core.export.png import heat_over
 from langflash_core.language.algebra import encode_prompts
 from langflash_core.language.answers import COVERED_ALPHA
 from langflash_core.language.spaces import language_space
-from langflash_core.resources import asset_path
 from langflash_core.scene.bare import bare_scene
 from langflash_core.scene.exposure import lit_camera
 from langflash_core.splat import render

@@ -5,9 +5,9 @@ from pathlib import Path
 import pytest
 import torch
 
+from langflash_core.base.records import Record
 from langflash_core.export import export, read
 from langflash_core.export.language import side_car
-from langflash_core.records import Record
 from langflash_core.scene.bare import bare_scene
 from langflash_core.types import Scene, Semantics
 from tests.export.splats import random_gaussians

@@ -12,10 +12,10 @@ import numpy as np
 import pytest
 import torch
 
+from langflash_core.base.formats import AXES
 from langflash_core.errors import OutputError, SceneFileError
 from langflash_core.export import export, read, spz
 from langflash_core.export.stored import ANTIALIASED, PLAIN
-from langflash_core.formats import AXES
 from langflash_core.scene.bare import bare_scene
 from langflash_core.scene.joining import joined
 from langflash_core.scene.standing import on_its_head

@@ -5,9 +5,9 @@ import pytest
 import torch
 import trimesh
 
+from langflash_core.base.files import write_atomically
 from langflash_core.errors import SceneFileError
 from langflash_core.export import export, read
-from langflash_core.files import write_atomically
 from langflash_core.scene.bare import bare_scene
 from langflash_core.scene.checks import check_scene
 from tests.export.splats import damaged_files, ply_bytes, random_gaussians, stored_columns

@@ -10,13 +10,13 @@ import pytest
 import torch
 from PIL import Image
 
+from langflash_core.base.records import World
+from langflash_core.base.request import ExportRequest
 from langflash_core.errors import SceneFileError
 from langflash_core.export import export, read
 from langflash_core.geometry.harmonics import SH_C0
 from langflash_core.level import upright
 from langflash_core.lift import posed_views
-from langflash_core.records import World
-from langflash_core.request import ExportRequest
 from langflash_core.writing import write
 from tests.app.cli.conftest import stripes
 from tests.export.splats import NAMES, ply_bytes, stored_columns

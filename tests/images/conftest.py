@@ -4,7 +4,7 @@ from pathlib import Path
 
 import pytest
 
-from langflash_core.apart import process
+from langflash_core.base.apart import process
 
 
 @pytest.fixture

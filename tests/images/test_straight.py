@@ -5,8 +5,8 @@ import numpy as np
 import pytest
 import torch
 
+from langflash_core.base.records import FoundFocal
 from langflash_core.images.straight import after, bent, smallest_scale, straightened
-from langflash_core.records import FoundFocal
 from langflash_core.types import Lenses, Views
 
 SIZE, FOCAL = (112, 84), 90.0

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from PIL import Image, ImageFilter
 
+from langflash_core.base.resources import asset_path
 from langflash_core.images.views import load_views
-from langflash_core.resources import asset_path
 from tests.images.pictures import room_picture, saved
 
 PAIRS = ("books", "aloe", "living_room", "desk", "toy")

@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
+from langflash_core.base.records import Guess
 from langflash_core.errors import InputError
 from langflash_core.inventory import alignment, beside, inventory
 from langflash_core.inventory.alignment import Fit
 from langflash_core.inventory.beside import difference
 from langflash_core.language.spaces import language_space
-from langflash_core.records import Guess
 from langflash_core.splat import render
 from tests.boxroom import CHAIRS, METRES, TABLE, WORDS, box_room
 

@@ -4,9 +4,9 @@ import pytest
 import torch
 from safetensors.torch import load_file, save_file
 
+from langflash_core.base.resources import asset_path
 from langflash_core.errors import PromptError, WeightsError
 from langflash_core.language.minilm import MAX_TOKENS, load_minilm, read_minilm
-from langflash_core.resources import asset_path
 from tests.language.reference import bert_twin
 
 WEIGHTS = "weights/minilm_l6_v2_rowint8.safetensors"

@@ -6,9 +6,9 @@ import pytest
 import torch
 from torch import Tensor
 
-from langflash_core.detail import DETAILS
-from langflash_core.fine import coloured_scene, covered_scene
+from langflash_core.base.detail import DETAILS
 from langflash_core.mending.looks import drawn
+from langflash_core.surface.fine import coloured_scene, covered_scene
 from langflash_core.types import Scene
 from tests.scene.photographed import SCREEN, WALL, photographed
 

@@ -3,9 +3,9 @@
 import pytest
 import torch
 
-from langflash_core.detail import DETAILS
-from langflash_core.fine import coloured_scene, covered_scene
+from langflash_core.base.detail import DETAILS
 from langflash_core.mending.hiding import Hiding, hide
+from langflash_core.surface.fine import coloured_scene, covered_scene
 from langflash_core.types import Scene
 from tests.scene.photographed import SCREEN, WALL, photographed
 

@@ -7,14 +7,14 @@ import pytest
 import torch
 from torch.nn import functional as F
 
+from langflash_core.depth.sharpening import sharpened
+from langflash_core.depth.surfaces import one_by_one
 from langflash_core.geometry.cameras import invert_rigid, rays
 from langflash_core.geometry.quaternions import quats_to_matrices
 from langflash_core.network.gaussians import CHANNELS, assemble_gaussians, footprints
 from langflash_core.network.model import pooled_weights
-from langflash_core.network.stereo.prior import DepthMaps
-from langflash_core.network.stereo.sharpening import sharpened
-from langflash_core.network.stereo.surfaces import one_by_one
-from langflash_core.network.stereo.sweep import Compared, gathered, patches, sweep_correlation
+from langflash_core.network.sweep import Compared, gathered, patches, sweep_correlation
+from langflash_core.rig.rig import DepthMaps
 from tests.geometry.spread import covariances
 
 K = torch.tensor([[40.0, 0, 16], [0, 40.0, 12], [0, 0, 1]], dtype=torch.float64)

@@ -8,7 +8,7 @@ from torch.nn import functional as F
 from langflash_core.network import MINI, initial_network
 from langflash_core.network.checkpoints.files import adopt_frozen
 from langflash_core.network.encoders.local import DIM, LocalFeatures, convert
-from langflash_core.network.stereo.prior import resize
+from langflash_core.network.prior import resize
 
 # (inputs, outputs, kernel, stride) per layer, as the paper's figure 3 has them
 BLOCKS = {

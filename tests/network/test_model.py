@@ -5,11 +5,11 @@ import pytest
 import torch
 from safetensors.torch import save_file
 
+from langflash_core.base.records import FoundFocal
+from langflash_core.cameras.poses import Poses
 from langflash_core.errors import Cancelled, WeightsError
 from langflash_core.network import MINI, GuidedDepthNet, guided, initial_network, load_network, save_network
 from langflash_core.network.checkpoints.files import dequantise, quantise, start_from
-from langflash_core.network.stereo.poses import Poses
-from langflash_core.records import FoundFocal
 from langflash_core.types import Prediction, Views
 
 

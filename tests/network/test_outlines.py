@@ -4,11 +4,11 @@ import pytest
 import torch
 from safetensors.torch import save_file
 
+from langflash_core.base.resources import weights_folder
 from langflash_core.errors import InputError, WeightsError
 from langflash_core.network.semantics.mobile_sam.model import MobileSam
 from langflash_core.network.semantics.outlines import FILES, SURE, Outlines, mobile_sam_checkpoint, outlined
 from langflash_core.pipeline import reconstruct
-from langflash_core.resources import weights_folder
 from tests.network.published import mobile_sam_name
 
 SIDE = 128

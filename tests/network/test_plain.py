@@ -3,9 +3,9 @@
 import pytest
 import torch
 
+from langflash_core.base.torchvision_fix import ensure_torchvision
 from langflash_core.network import MINI
 from langflash_core.network.encoders.plain import PlainViT
-from langflash_core.torchvision_fix import ensure_torchvision
 
 
 @pytest.fixture(scope="module")

@@ -7,10 +7,10 @@ import torch
 from torch.nn import functional as F
 
 from langflash_core import reconstruct
+from langflash_core.base.resources import asset_path
 from langflash_core.errors import InputError
 from langflash_core.images.views import load_views
 from langflash_core.network import load_network, precision
-from langflash_core.resources import asset_path
 
 
 @pytest.mark.parametrize(

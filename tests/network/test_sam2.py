@@ -3,9 +3,9 @@
 import pytest
 import torch
 
+from langflash_core.base.resources import weights_folder
 from langflash_core.errors import WeightsError
 from langflash_core.network.semantics.sam2 import CONFIGS, GRID, Sam2, sam2_checkpoint
-from langflash_core.resources import weights_folder
 
 
 @pytest.fixture(autouse=True)

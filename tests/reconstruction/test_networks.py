@@ -8,8 +8,8 @@ import pytest
 import torch
 
 import langflash_core as lf
+from langflash_core.base.resources import asset_path
 from langflash_core.reconstruction import tools
-from langflash_core.resources import asset_path
 
 PHOTO = asset_path("photos/books_left.jpg")
 SMALL = 56  # pixels

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 import torch
 
+from langflash_core.base.records import World
 from langflash_core.geometry import rotations
-from langflash_core.records import World
 from langflash_core.scene.above import drawn_from_above, seen_from_above
 from langflash_core.scene.world import placed
 from langflash_core.types import Scene

@@ -4,7 +4,7 @@ from typing import Any
 
 import pytest
 
-from langflash_core.records import Record
+from langflash_core.base.records import Record
 from langflash_core.scene.doubts import doubt_line, doubtful, told_warnings
 from langflash_core.scene.record import from_json, to_json
 

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 import torch
 
+from langflash_core.base.records import World
 from langflash_core.errors import SceneFileError
 from langflash_core.geometry.poses import Pose, Vector
 from langflash_core.language.relevance import compile_query, relevance_maps
 from langflash_core.language.spaces import LanguageSpace
-from langflash_core.records import World
 from langflash_core.scene.changes import Moved, Recoloured
 from langflash_core.scene.edited import edited_scene, first_marks, spoken_scene
 from langflash_core.scene.edits import (

@@ -14,12 +14,12 @@ import torch
 from langflash_core.errors import OutputError, SceneFileError
 from langflash_core.export import export, read
 from langflash_core.scene import container
-from langflash_core.scene.assemble import assemble
 from langflash_core.scene.fields import REQUIRED, field_bytes
 from langflash_core.scene.file import load, save
-from langflash_core.scene.prune import prune
 from langflash_core.scene.report import describe, describe_file
 from langflash_core.splat.reference import render
+from langflash_core.surface.assemble import assemble
+from langflash_core.surface.prune import prune
 from langflash_core.types import Cost, Record, Scene
 from tests.scene.plane import wall_prediction
 

@@ -5,8 +5,8 @@ from dataclasses import replace
 
 import pytest
 
+from langflash_core.base.records import Guess, Record, World, world_from_json, world_to_json
 from langflash_core.errors import SceneFileError
-from langflash_core.records import Guess, Record, World, world_from_json, world_to_json
 from langflash_core.scene.file import load, save
 from langflash_core.scene.record import from_json, to_json
 from tests.app.cli.conftest import stripes

@@ -5,9 +5,9 @@ from typing import Any
 
 import pytest
 
-from langflash_core.scene.assemble import assemble
 from langflash_core.scene.file import load, save
 from langflash_core.scene.report import describe, describe_file, detail_line, left_out_line, lens_line
+from langflash_core.surface.assemble import assemble
 from langflash_core.types import Scene
 from tests.scene.plane import wall_prediction
 from tests.splat.test_compose import layered

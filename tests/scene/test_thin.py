@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import torch
 
-from langflash_core.records import Record
+from langflash_core.base.records import Record
 from langflash_core.scene.thin import (
     coarse_level,
     coarse_share,

@@ -13,7 +13,7 @@ from pathlib import Path
 
 import numpy as np
 
-from langflash_core.resources import asset_path
+from langflash_core.base.resources import asset_path
 from tests.tools.journey import LEFT, PHOTOS, TOP, Person, person
 from tests.tools.sheet import Shot, write_sheet
 

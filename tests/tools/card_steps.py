@@ -22,7 +22,7 @@ from app.bench.generated import phrases
 from app.bench.machine import host
 from app.bench.measure import _Bench, _times
 from app.bench.modes import DEFAULT, MODES
-from langflash_core.graphics import offscreen_context
+from langflash_core.base.graphics import offscreen_context
 from langflash_core.language.relevance import relevance_maps
 from langflash_core.splat import NEAR, rasterize, view_colours
 from langflash_core.types import Camera, Gaussians

@@ -20,7 +20,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 
-from langflash_core.resources import asset_path
+from langflash_core.base.resources import asset_path
 from tests.app.window.guarded import HOMES
 from tests.app.window.test_window import ROOT, Program, x_server
 

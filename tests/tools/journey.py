@@ -16,7 +16,7 @@ from pathlib import Path
 import numpy as np
 
 from app.window.kit import theme
-from langflash_core.resources import asset_path
+from langflash_core.base.resources import asset_path
 from tests.app.window.guarded import environment
 from tests.app.window.test_window import ROOT, x_server
 from tests.app.window.x11 import Client

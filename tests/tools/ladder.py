@@ -23,7 +23,7 @@ from torch.nn.functional import interpolate
 
 import langflash_core as lf
 from app.gl import SplatRenderer, moving_renderer
-from langflash_core.graphics import offscreen_context
+from langflash_core.base.graphics import offscreen_context
 from langflash_core.language.relevance import compile_query
 from langflash_core.language.spaces import language_space
 from langflash_core.scene.thin import coarse_share, thin_with_rows

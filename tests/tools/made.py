@@ -155,7 +155,7 @@ def by_window() -> None:
 def _exported(guide) -> None:
     """What the window's dialog writes, of versions whose dialog knows the table of files."""
     with contextlib.suppress(ImportError):
-        outputs = importlib.import_module("langflash_core.outputs")
+        outputs = importlib.import_module("langflash_core.base.outputs")
         export = importlib.import_module("app.window.exporting.commands")
         for what, path in (
             (outputs.RGB, "rgb.png"), (outputs.CUTOUT, "cutout.png"), (outputs.PLY, "a.ply"),

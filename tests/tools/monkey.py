@@ -44,10 +44,10 @@ from app.window.recovery.preferences import DEFAULTS
 from app.window.scene import camera
 from app.window.session import Session
 from app.window.touring.commands import ShowTour
-from langflash_core import pictures
-from langflash_core.files import write_atomically
-from langflash_core.pictures import PICTURES
-from langflash_core.resources import asset_path
+from langflash_core.base import pictures
+from langflash_core.base.files import write_atomically
+from langflash_core.base.pictures import PICTURES
+from langflash_core.base.resources import asset_path
 from tests.app.window.guarded import REFUSED, environment
 from tests.app.window.items import Items
 from tests.app.window.test_window import ROOT, x_server

@@ -41,9 +41,9 @@ from app.window.scene.state import FLIGHT_SECONDS
 from app.window.scene.work import describe_scene
 from app.window.state import State
 from app.window.viewport import Viewport
+from langflash_core.base.graphics import offscreen_context
 from langflash_core.geometry import poses
 from langflash_core.geometry.poses import Pose
-from langflash_core.graphics import offscreen_context
 from langflash_core.types import Scene
 from tests.app.window.headless import context
 from tests.boxroom import box_room, in_layers

@@ -8,7 +8,7 @@ import imgui_bundle
 import numpy as np
 from PIL import Image, ImageDraw, ImageFont
 
-from langflash_core.files import write_atomically
+from langflash_core.base.files import write_atomically
 
 FONT = Path(imgui_bundle.__file__).parent / "assets" / "fonts" / "Roboto" / "Roboto-Regular.ttf"
 GAP, CAPTION = 12, 30  # pixels

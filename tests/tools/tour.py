@@ -27,10 +27,10 @@ from app.window.recovery.state import Kept
 from app.window.scene import camera
 from app.window.scene import commands as show
 from app.window.session import Session
-from langflash_core import outputs, pictures
+from langflash_core.base import outputs, pictures
+from langflash_core.base.pictures import PICTURES
+from langflash_core.base.resources import asset_path
 from langflash_core.geometry import poses
-from langflash_core.pictures import PICTURES
-from langflash_core.resources import asset_path
 from tests.app.window.test_window import TOP, x_server
 from tests.app.window.x11 import Client
 from tests.tools.sheet import Shot, write_picture, write_sheet

@@ -39,7 +39,7 @@ WATCHED = {
     "app.gl.processor.host": ("HostAnswers.answer", "read_maps", "inverse_norms"),
     "app.gl.packed": ("PackedMaps._of",),
     "app.gl.display": ("Display._filled",),
-    "langflash_core.graphics": ("Programs.get",),
+    "langflash_core.base.graphics": ("Programs.get",),
 }  # fmt: skip
 
 

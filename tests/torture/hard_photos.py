@@ -19,10 +19,10 @@ import torch
 from torch.nn import functional as F
 
 from langflash_core import pipeline
+from langflash_core.base.resources import asset_path
 from langflash_core.errors import LangFlashError
 from langflash_core.images.views import load_views
 from langflash_core.network import GuidedDepthNet, load_network
-from langflash_core.resources import asset_path
 from langflash_core.types import Scene
 
 SIZE = 112  # about which the network sees, pixels a side

@@ -18,13 +18,13 @@ from app.window.recovery import edits, preferences, sessions
 from app.window.recovery.keeper import Keeper
 from app.window.recovery.state import Kept
 from app.window.scene.work import LoadScene
+from langflash_core.base.formats import USD
+from langflash_core.base.outputs import OUTPUTS, Output
+from langflash_core.base.resources import asset_path
 from langflash_core.batch.dispatch import Job as Set
 from langflash_core.batch.dispatch import Lost, Made
 from langflash_core.export import export
-from langflash_core.formats import USD
 from langflash_core.lab.training.shards import write_shard
-from langflash_core.outputs import OUTPUTS, Output
-from langflash_core.resources import asset_path
 from langflash_core.scene.edited import first_marks
 from langflash_core.scene.edits import History, Marks, Mask, delete
 from langflash_core.scene.file import save

@@ -29,8 +29,8 @@ from app.window.recovery import preferences
 from app.window.recovery.effects import KEEP_AFTER
 from app.window.scene import commands as show
 from app.window.scene.work import LoadScene, describe_scene
+from langflash_core.base.files import staged_folder
 from langflash_core.export import export
-from langflash_core.files import staged_folder
 from langflash_core.scene.edited import edited_scene, first_marks
 from langflash_core.scene.edits import Mask, delete
 from langflash_core.types import Scene

@@ -17,10 +17,10 @@ from pathlib import Path
 import torch
 
 from app.cli.renderers import GlRenderer
+from langflash_core.base.memory import give_back
 from langflash_core.geometry.poses import from_view, to_camera
 from langflash_core.language.relevance import compile_query, relevance_maps
 from langflash_core.language.spaces import language_space
-from langflash_core.memory import give_back
 from langflash_core.types import Camera, Scene, Semantics
 from langflash_core.writing.renderers import TorchRenderer
 from tests.app.cli.conftest import WORDS, stripes

@@ -29,10 +29,10 @@ import imageio_ffmpeg
 import numpy as np
 from PIL import Image
 
+from langflash_core.base.formats import kind_of
+from langflash_core.base.outputs import READERS, loaded
+from langflash_core.base.resources import asset_path, shader_path
 from langflash_core.errors import LangFlashError
-from langflash_core.formats import kind_of
-from langflash_core.outputs import READERS, loaded
-from langflash_core.resources import asset_path, shader_path
 from tests.torture.failing import Fault, failing, small_disk
 
 ERRORS = {

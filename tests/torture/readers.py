@@ -14,15 +14,15 @@ from app.window.recovery import preferences, sessions
 from app.window.recovery.commands import restored_phrases
 from app.window.recovery.state import Kept
 from app.window.state import State
+from langflash_core.base.keeping import Keep
+from langflash_core.base.phrases import read_phrases
 from langflash_core.batch.sets import read_sets
 from langflash_core.errors import InputError, SceneFileError
 from langflash_core.export import export, spz
 from langflash_core.export.gltf import write_glb
 from langflash_core.geometry.poses import Pose, Vector
-from langflash_core.keeping import Keep
 from langflash_core.language.lessons import Lesson, Lessons, read_lessons, write_lessons
 from langflash_core.mending.recipes import Recipe, load_recipe, save_recipe
-from langflash_core.phrases import read_phrases
 from langflash_core.scene.bare import bare_scene
 from langflash_core.scene.report import describe_file
 from langflash_core.scene.tour import Note, Stop, Tour, read_tour, told_tour

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
+from langflash_core.base.memory import free_memory
 from langflash_core.errors import SceneFileError
 from langflash_core.export import stored
-from langflash_core.memory import free_memory
 from tests.torture import large, load
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="/proc")

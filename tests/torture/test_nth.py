@@ -12,9 +12,9 @@ import pytest
 import torch
 
 from app.cli import main
+from langflash_core.base.graphics import refusals_said
+from langflash_core.base.memory import out_of_memory
 from langflash_core.errors import GraphicsError
-from langflash_core.graphics import refusals_said
-from langflash_core.memory import out_of_memory
 from tests.torture import jobs, nth
 from tests.torture.failing import failing, small_disk
 

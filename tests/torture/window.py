@@ -24,7 +24,7 @@ from app.window.opening.commands import OpenFiles, Paste
 from app.window.scene import camera
 from app.window.scene.commands import SaveScene
 from app.window.session import Session
-from langflash_core.pictures import PICTURES
+from langflash_core.base.pictures import PICTURES
 from langflash_core.scene.edits import Mask
 from tests.app.window.test_window import x_server
 from tests.torture.failing import failing

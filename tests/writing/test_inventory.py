@@ -9,8 +9,8 @@ import xml.etree.ElementTree as ET
 
 import pytest
 
+from langflash_core.base.request import ExportRequest
 from langflash_core.export.png import to_8bit
-from langflash_core.request import ExportRequest
 from langflash_core.splat import render
 from langflash_core.writing import write
 from tests.boxroom import DEEP, METRES, WIDE, box_room

@@ -7,15 +7,15 @@ from functools import partial
 from typing import TextIO
 
 from langflash_core.__main__ import in_program
+from langflash_core.base.files import check_folder, held_alone, readable_file
+from langflash_core.base.outputs import ALL_OUT, output_of
+from langflash_core.base.request import spoken
 from langflash_core.batch.dispatch import Job
 from langflash_core.batch.ledger import FAILED, Ledger
 from langflash_core.batch.order import Order, export_path
 from langflash_core.batch.run import finish, jobs_of, left_to_do, run_jobs
 from langflash_core.batch.sets import LEDGER, SUMMARY, read_sets
 from langflash_core.errors import InputError, PromptError, WeightsError
-from langflash_core.files import check_folder, held_alone, readable_file
-from langflash_core.outputs import ALL_OUT, output_of
-from langflash_core.request import spoken
 
 from ..crew import crew, processors, threads_said
 from ..report import INTERRUPTED, say_error, write_json

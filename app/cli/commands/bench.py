@@ -3,8 +3,8 @@
 from argparse import Namespace
 from typing import TYPE_CHECKING, TextIO
 
+from langflash_core.base.files import check_folder, readable_file, staged_folder
 from langflash_core.errors import InputError, OutputError, PromptError, SceneFileError
-from langflash_core.files import check_folder, readable_file, staged_folder
 
 from ..report import ProgressBar, write_json
 from ..scenes import open_scene

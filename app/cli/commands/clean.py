@@ -3,8 +3,8 @@
 from argparse import Namespace
 from typing import TYPE_CHECKING, TextIO
 
+from langflash_core.base.files import check_output_file, make_folder, readable_file
 from langflash_core.errors import InputError
-from langflash_core.files import check_output_file, make_folder, readable_file
 from langflash_core.mending.recipes import (
     KINDS,
     STRENGTH,

@@ -5,10 +5,10 @@ from dataclasses import fields
 from functools import partial
 from typing import TextIO
 
+from langflash_core.base.files import readable_file
+from langflash_core.base.outputs import output_of
+from langflash_core.base.request import ExportRequest, spoken
 from langflash_core.errors import SceneFileError
-from langflash_core.files import readable_file
-from langflash_core.outputs import output_of
-from langflash_core.request import ExportRequest, spoken
 
 from ..report import ProgressBar
 

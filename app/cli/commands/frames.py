@@ -11,18 +11,18 @@ from typing import Any, TextIO
 import numpy as np
 from PIL import Image
 
-from langflash_core.errors import OutputError
-from langflash_core.files import (
+from langflash_core.base.files import (
     check_folder,
     check_output_file,
     filled_atomically,
     make_folder,
     write_atomically,
 )
+from langflash_core.base.picture_files import opened_picture
+from langflash_core.errors import OutputError
 from langflash_core.images.pictures import FILM_PHOTOS
 from langflash_core.images.still_names import is_still, shown_name
 from langflash_core.images.strip import Choice, Strip, choose, notes_on
-from langflash_core.picture_files import opened_picture
 
 from ..films import look_through, sentence, summary
 from ..report import ProgressBar, say_warnings, write_json

@@ -3,8 +3,8 @@
 from argparse import Namespace
 from typing import TYPE_CHECKING, Any, TextIO
 
+from langflash_core.base.files import check_output_file, make_folder
 from langflash_core.errors import InputError
-from langflash_core.files import check_output_file, make_folder
 
 from ...places import forget_pictures
 from ..files import checked_scene

@@ -4,9 +4,9 @@ from argparse import Namespace
 from pathlib import Path
 from typing import Any, TextIO
 
+from langflash_core.base.files import readable_file
+from langflash_core.base.limits import LIMITS
 from langflash_core.errors import InputError, SceneFileError
-from langflash_core.files import readable_file
-from langflash_core.limits import LIMITS
 
 from ..report import write_json
 from ..sbom import bill_of_materials
@@ -60,7 +60,7 @@ def _described(path: Path, axes: str | None) -> dict[str, Any]:
 def _for_people(document: dict[str, Any]) -> dict[str, Any]:
     """With detail, lens, world and what was left out as a line each, none where there is nothing to say; with
     what pruning changed; without timings, where nobody knows them."""
-    from langflash_core.records import world_from_json
+    from langflash_core.base.records import world_from_json
     from langflash_core.scene.report import detail_line, left_out_line, lens_line, world_line
 
     lines = {

@@ -5,10 +5,10 @@ from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, TextIO
 
+from langflash_core.base.files import check_output_file, make_folder
+from langflash_core.base.outputs import output_of
+from langflash_core.base.request import ExportRequest
 from langflash_core.errors import InputError
-from langflash_core.files import check_output_file, make_folder
-from langflash_core.outputs import output_of
-from langflash_core.request import ExportRequest
 
 from ..files import checked_scene
 from ..report import ProgressBar, write_json

@@ -5,8 +5,8 @@ from argparse import Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING, TextIO
 
+from langflash_core.base.files import check_output_file, make_folder
 from langflash_core.errors import InputError
-from langflash_core.files import check_output_file, make_folder
 
 from ..files import checked_scene
 from ..report import write_json
@@ -30,7 +30,7 @@ def run(args: Namespace, out: TextIO) -> None:
     first, last, told = args.length or ("", "", "")
     metres = _metres(told) if told else None
     from langflash_core import level
-    from langflash_core.records import world_to_json
+    from langflash_core.base.records import world_to_json
     from langflash_core.scene.report import world_line
 
     from ..scenes import open_scene

@@ -4,8 +4,8 @@ import time
 from argparse import Namespace
 from typing import TextIO
 
+from langflash_core.base.files import check_output_file, readable_file
 from langflash_core.errors import ImageError, InputError, WeightsError
-from langflash_core.files import check_output_file, readable_file
 
 from ..renderers import open_renderer
 from ..report import ProgressBar, say_warnings, write_json
@@ -29,8 +29,8 @@ def run(args: Namespace, out: TextIO) -> None:
         readable_file(args.weights, "checkpoint", WeightsError)
     check_output_file(args.output, SUFFIXES, inputs=[args.scene, *(args.photos or ())])
     scene = open_scene(args.scene, args.axes)
+    from langflash_core.base.files import make_folder
     from langflash_core.export import export
-    from langflash_core.files import make_folder
     from langflash_core.lift import lift, posed_views
 
     views, viewmats = None, None

@@ -4,10 +4,10 @@ from argparse import Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
 
+from langflash_core.base.files import check_folder, staged_folder
+from langflash_core.base.phrases import read_phrases
+from langflash_core.base.request import spoken
 from langflash_core.errors import InputError
-from langflash_core.files import check_folder, staged_folder
-from langflash_core.phrases import read_phrases
-from langflash_core.request import spoken
 
 from ..files import checked_scene
 from ..report import ProgressBar, say_warnings, write_json
@@ -79,7 +79,7 @@ def _written(args: Namespace, result: "QueryResult") -> list[dict[str, str]]:
     Raises:
         OutputError: the folder cannot be written.
     """
-    from langflash_core.colormaps import HeatColours
+    from langflash_core.base.colormaps import HeatColours
     from langflash_core.export.answers import write_answers
 
     with staged_folder(args.output) as staging:

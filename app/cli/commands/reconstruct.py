@@ -7,9 +7,9 @@ from contextlib import suppress
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
 
+from langflash_core.base.files import check_output_file, held_alone, readable_file
+from langflash_core.base.keeping import forget, holds_steps
 from langflash_core.errors import InputError, WeightsError
-from langflash_core.files import check_output_file, held_alone, readable_file
-from langflash_core.keeping import forget, holds_steps
 
 from ..files import checked_photos
 from ..films import recorded, with_frames
@@ -78,7 +78,7 @@ def _kept(args: Namespace, films: Sequence[dict[str, Any]]) -> "Scene":
 
 def _written(args: Namespace, films: Sequence[dict[str, Any]]) -> "Scene":
     """The scene, once it is on the disk."""
-    from langflash_core.ahead import begin
+    from langflash_core.reconstruction.ahead import begin
 
     ahead = begin(args.photos, preset=args.preset, weights=args.weights, size=args.size, keep=args.keep)
     ahead.check_photos()

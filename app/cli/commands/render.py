@@ -4,13 +4,13 @@ from argparse import Namespace
 from collections.abc import Sequence
 from typing import Any, TextIO
 
-from langflash_core.colormaps import HeatColours
+from langflash_core.base.colormaps import HeatColours
+from langflash_core.base.files import check_output_file, readable_file
+from langflash_core.base.outputs import loaded
+from langflash_core.base.pictures import Picture
+from langflash_core.base.request import spoken
 from langflash_core.errors import InputError, PromptError, SceneFileError
 from langflash_core.export.paint import write_picture
-from langflash_core.files import check_output_file, readable_file
-from langflash_core.outputs import loaded
-from langflash_core.pictures import Picture
-from langflash_core.request import spoken
 from langflash_core.types import Scene
 from langflash_core.writing.drawn import Look
 

@@ -5,16 +5,16 @@ from argparse import Namespace
 from pathlib import Path
 from typing import Any, TextIO
 
-from langflash_core.errors import InputError, SceneFileError, ViewError
-from langflash_core.files import (
+from langflash_core.base.files import (
     check_output_file,
     check_same_kind,
     make_folder,
     readable_file,
     write_atomically,
 )
+from langflash_core.base.limits import TEXT
+from langflash_core.errors import InputError, SceneFileError, ViewError
 from langflash_core.geometry.poses import Vector
-from langflash_core.limits import TEXT
 from langflash_core.scene.container import Container
 from langflash_core.scene.tour import Note, Stop, Tour, checked, read_tour, told_tour
 from langflash_core.showing.tours import (

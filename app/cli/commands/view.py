@@ -3,8 +3,8 @@
 from argparse import Namespace
 from typing import TextIO
 
+from langflash_core.base.files import readable_file
 from langflash_core.errors import ImageError
-from langflash_core.files import readable_file
 
 
 def run(args: Namespace, out: TextIO) -> int:

@@ -8,14 +8,14 @@ from typing import Any, TextIO
 
 from safetensors import SafetensorError, safe_open
 
+from langflash_core.base.files import readable_file
+from langflash_core.base.resources import asset_path, weights_folder
 from langflash_core.errors import WeightsError
-from langflash_core.files import readable_file
 from langflash_core.network import PRESETS, load_network
 from langflash_core.network.checkpoints.catalogue import CATALOGUE, CLIP, OTHERS, SAM2, published
 from langflash_core.network.checkpoints.download import download
 from langflash_core.network.checkpoints.parts import FORMAT, part_folder, read_part
 from langflash_core.network.checkpoints.store import install, verify_part
-from langflash_core.resources import asset_path, weights_folder
 
 from ..report import ProgressBar, say_warnings, write_json
 

@@ -4,8 +4,8 @@ from argparse import Namespace
 from pathlib import Path
 from typing import TextIO
 
+from langflash_core.base.files import check_output_file
 from langflash_core.errors import InputError, PromptError
-from langflash_core.files import check_output_file
 from langflash_core.language.lessons import SUFFIX
 
 from ..files import checked_scene

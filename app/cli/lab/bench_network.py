@@ -7,8 +7,8 @@ from dataclasses import asdict
 from pathlib import Path
 from typing import TextIO
 
+from langflash_core.base.files import check_output_file, readable_file
 from langflash_core.errors import InputError, WeightsError
-from langflash_core.files import check_output_file, readable_file
 
 from ..report import ProgressBar, write_json
 
@@ -25,8 +25,8 @@ def run(args: Namespace, out: TextIO) -> None:
         check_output_file(args.output, (".json",))
     import torch
 
+    from langflash_core.base.memory import peak_memory_mb
     from langflash_core.lab.evaluation.speed import Plan, measure_network, speed_table
-    from langflash_core.memory import peak_memory_mb
     from langflash_core.network import PRESETS
 
     device = args.device if args.device != "auto" else ("cuda" if torch.cuda.is_available() else "cpu")
@@ -86,7 +86,7 @@ def _network(args: Namespace, device: str):
 def _write(path: Path, document: dict) -> None:
     import io
 
-    from langflash_core.files import make_folder, write_atomically
+    from langflash_core.base.files import make_folder, write_atomically
 
     stream = io.StringIO()
     write_json(document, stream)

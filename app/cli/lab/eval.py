@@ -7,14 +7,14 @@ from argparse import Namespace
 from pathlib import Path
 from typing import TextIO
 
+from langflash_core.base.files import check_output_file, make_folder, readable_file, write_atomically
+from langflash_core.base.request import spoken
 from langflash_core.errors import ImageError, InputError, WeightsError
-from langflash_core.files import check_output_file, make_folder, readable_file, write_atomically
 from langflash_core.lab.evaluation.rooms.run import run_eval
 from langflash_core.lab.evaluation.tables import markdown
 from langflash_core.lab.photos import PhotoFolder, chosen_ids
 from langflash_core.lab.training.stages.stage import guided
 from langflash_core.network import load_network
-from langflash_core.request import spoken
 
 from ..renderers import open_renderer
 from ..report import ProgressBar, say_warnings, write_json, write_tables

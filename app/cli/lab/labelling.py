@@ -9,13 +9,13 @@ from pathlib import Path
 import cv2
 import torch
 
+from langflash_core.base.memory import peak_memory_mb
+from langflash_core.base.optional import optional_packages
+from langflash_core.base.running import Progress
 from langflash_core.batch.dispatch import Job, Made
-from langflash_core.extras import optional_packages
 from langflash_core.lab.labels.clips import ClipPlace
 from langflash_core.lab.labels.making import LabelMaker
 from langflash_core.lab.labels.order import LabelOrder
-from langflash_core.memory import peak_memory_mb
-from langflash_core.running import Progress
 
 from ..report import explained
 

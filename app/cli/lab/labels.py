@@ -8,12 +8,12 @@ from pathlib import Path
 from typing import TextIO
 
 from langflash_core.__main__ import in_program
+from langflash_core.base.files import check_folder, filled_atomically, held_alone
 from langflash_core.batch.dispatch import Job, Lost, Made
 from langflash_core.batch.ledger import DONE, FAILED, Ledger
 from langflash_core.batch.run import finish, run_jobs
 from langflash_core.batch.sets import LEDGER, SUMMARY
 from langflash_core.errors import InputError
-from langflash_core.files import check_folder, filled_atomically, held_alone
 from langflash_core.lab.labels.clips import INDEX, ClipPlace, find_clips
 from langflash_core.lab.labels.making import REPORT
 from langflash_core.lab.labels.order import LabelOrder

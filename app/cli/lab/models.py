@@ -3,8 +3,8 @@
 from argparse import Namespace
 from pathlib import Path
 
+from langflash_core.base.files import readable_file
 from langflash_core.errors import WeightsError
-from langflash_core.files import readable_file
 from langflash_core.lab.labels.order import LabelOrder
 
 

@@ -3,8 +3,8 @@
 from argparse import Namespace
 from typing import TextIO
 
+from langflash_core.base.files import check_folder, check_output_file, make_folder, readable_file
 from langflash_core.errors import InputError
-from langflash_core.files import check_folder, check_output_file, make_folder, readable_file
 from langflash_core.lab.rooms.commands import run_pack, run_preview, run_render
 
 from ..report import ProgressBar

@@ -3,8 +3,8 @@
 from pathlib import Path
 from typing import TYPE_CHECKING
 
+from langflash_core.base.files import readable_file
 from langflash_core.errors import WeightsError
-from langflash_core.files import readable_file
 from langflash_core.lab.evaluation.labelled import Render
 from langflash_core.scene.exposure import lit_camera
 from langflash_core.types import Camera, Frame, Scene

@@ -8,9 +8,10 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any, TextIO
 
+from langflash_core.base.files import check_folder, check_output_file, readable_file
+from langflash_core.base.optional import optional_packages
+from langflash_core.base.resources import asset_path
 from langflash_core.errors import InputError, WeightsError
-from langflash_core.extras import optional_packages
-from langflash_core.files import check_folder, check_output_file, readable_file
 from langflash_core.lab.labels.lite import read_others, read_scores
 from langflash_core.lab.labels.opinions import LiteNetwork, write_opinions
 from langflash_core.lab.labels.outlines import write_outlines
@@ -37,7 +38,6 @@ from langflash_core.lab.training.trained import run_export
 from langflash_core.language.spaces import language_space
 from langflash_core.network import PRESETS
 from langflash_core.network.semantics.mobile_sam.model import load_mobile_sam
-from langflash_core.resources import asset_path
 
 from ..report import ProgressBar
 from .photos import opened_folder

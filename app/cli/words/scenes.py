@@ -2,11 +2,11 @@
 
 from pathlib import Path
 
-from langflash_core import pictures
-from langflash_core.detail import EXPORT_DETAILS
+from langflash_core.base import pictures
+from langflash_core.base.detail import EXPORT_DETAILS
+from langflash_core.base.outputs import WORDS, help_of_files, help_of_words
 from langflash_core.mending.recipes import HOWS, KINDS
 from langflash_core.network.presets import AGGREGATIONS, GROUPINGS, PRECISIONS
-from langflash_core.outputs import WORDS, help_of_files, help_of_words
 
 from ..values import (
     above_zero,

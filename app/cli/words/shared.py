@@ -3,8 +3,8 @@
 import argparse
 from pathlib import Path
 
-from langflash_core.detail import DEFAULT_DETAIL, DETAILS, FEWEST, MOST
-from langflash_core.formats import AXES, COLOUR_MAPS
+from langflash_core.base.detail import DEFAULT_DETAIL, DETAILS, FEWEST, MOST
+from langflash_core.base.formats import AXES, COLOUR_MAPS
 
 from ..values import (
     above_zero,

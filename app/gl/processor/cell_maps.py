@@ -6,7 +6,7 @@ from functools import partial
 import moderngl
 import numpy as np
 
-from langflash_core.graphics import set_uniforms
+from langflash_core.base.graphics import set_uniforms
 
 from ..blend import add_maps
 from ..buffers import Growing

@@ -5,7 +5,7 @@ from itertools import repeat, zip_longest
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from langflash_core import pictures
+from langflash_core.base import pictures
 from langflash_core.geometry.poses import Vector
 
 from ..state import State

@@ -6,8 +6,8 @@ import math
 from dataclasses import dataclass
 from pathlib import Path
 
+from langflash_core.base.files import write_atomically
 from langflash_core.errors import PromptError
-from langflash_core.files import write_atomically
 
 from .state import PALETTE, Prompt
 

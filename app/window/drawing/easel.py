@@ -8,9 +8,9 @@ from typing import TYPE_CHECKING
 import moderngl
 import numpy as np
 
-from langflash_core import pictures
+from langflash_core.base import pictures
+from langflash_core.base.pictures import Picture
 from langflash_core.geometry.poses import to_camera
-from langflash_core.pictures import Picture
 from langflash_core.scene.exposure import PlaceLight
 from langflash_core.scene.world import upward
 

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass, replace
 
-from langflash_core import pictures
+from langflash_core.base import pictures
 from langflash_core.mending.recipes import Box, Recipe
 from langflash_core.scene import edits
 from langflash_core.scene.changes import Moved

@@ -9,7 +9,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from langflash_core import pictures
+from langflash_core.base import pictures
 from langflash_core.geometry.rotations import quaternion
 from langflash_core.scene import edits
 from langflash_core.scene.changes import (

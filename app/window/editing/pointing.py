@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from langflash_core import pictures
+from langflash_core.base import pictures
 from langflash_core.geometry import poses
 from langflash_core.geometry.poses import Vector
 from langflash_core.scene.edits import Combine

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from langflash_core.files import make_folder
+from langflash_core.base.files import make_folder
 from langflash_core.scene import edits
 
 from ..commands import Notify

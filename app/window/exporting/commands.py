@@ -3,7 +3,7 @@
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from langflash_core.outputs import RGB, ROOM, Output
+from langflash_core.base.outputs import RGB, ROOM, Output
 
 from ..commands import Notify
 from ..dialogs import Dialog

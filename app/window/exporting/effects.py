@@ -3,8 +3,8 @@
 from dataclasses import replace
 from pathlib import Path
 
+from langflash_core.base.files import make_folder, write_atomically
 from langflash_core.errors import LangFlashError
-from langflash_core.files import make_folder, write_atomically
 from langflash_core.scene.edits import Marks, Mask
 
 from ..commands import Command, Notify

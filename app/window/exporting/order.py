@@ -8,8 +8,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from langflash_core.outputs import PAGE, SEGMENTED
-from langflash_core.request import ExportRequest
+from langflash_core.base.outputs import PAGE, SEGMENTED
+from langflash_core.base.request import ExportRequest
 
 from ..scene.drops import typed_path
 from ..scene.near import fills_gaps, keeps_near, photos_known

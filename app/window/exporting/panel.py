@@ -6,7 +6,7 @@ from dataclasses import replace
 from imgui_bundle import ImVec2, imgui
 from imgui_bundle import icons_fontawesome_6 as fa
 
-from langflash_core.outputs import OFFERED, ROOM
+from langflash_core.base.outputs import OFFERED, ROOM
 
 from .. import commands as do
 from ..dialogs import Dialog

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from pathlib import Path
 
-from langflash_core.outputs import RGB, Output
+from langflash_core.base.outputs import RGB, Output
 
 SECONDS = (1.0, 60.0)
 

@@ -11,7 +11,7 @@ from pathlib import Path
 from imgui_bundle import icons_fontawesome_6 as fa
 from imgui_bundle import imgui
 
-from langflash_core.pictures import KEYED, PICTURES, Picture
+from langflash_core.base.pictures import KEYED, PICTURES, Picture
 
 from .. import commands as do
 from ..asking import commands as ask

@@ -5,9 +5,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float
 
+from langflash_core.base.records import Guess
 from langflash_core.geometry import poses
 from langflash_core.geometry.poses import Pose, Vector
-from langflash_core.records import Guess
 from langflash_core.scene import edits
 from langflash_core.scene.edits import Combine
 

@@ -4,8 +4,8 @@ it is; and the box of the chosen one in the picture."""
 from imgui_bundle import ImVec2, imgui
 from imgui_bundle import icons_fontawesome_6 as fa
 
+from langflash_core.base.outputs import ROOM
 from langflash_core.geometry import poses
-from langflash_core.outputs import ROOM
 from langflash_core.scene.edits import Combine
 
 from .. import commands as do

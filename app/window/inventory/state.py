@@ -5,7 +5,7 @@ from dataclasses import dataclass, field
 import numpy as np
 from jaxtyping import Float
 
-from langflash_core.records import Guess
+from langflash_core.base.records import Guess
 from langflash_core.scene.mask import Mask
 
 

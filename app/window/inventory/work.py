@@ -8,8 +8,8 @@ from typing import TYPE_CHECKING
 import numpy as np
 from jaxtyping import Float
 
+from langflash_core.base.picture_files import STORED, opened_picture
 from langflash_core.geometry import rotations
-from langflash_core.picture_files import STORED, opened_picture
 from langflash_core.scene.edits import Marks
 from langflash_core.scene.mask import Mask
 

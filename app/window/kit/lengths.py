@@ -1,6 +1,6 @@
 """Lengths for people."""
 
-from langflash_core.records import Guess
+from langflash_core.base.records import Guess
 
 
 def said(length: float, metric: float | None, guess: Guess | None = None) -> str:

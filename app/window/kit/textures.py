@@ -4,7 +4,7 @@ import moderngl
 import numpy as np
 from imgui_bundle import imgui
 
-from langflash_core.picture_files import STORED, opened_picture
+from langflash_core.base.picture_files import STORED, opened_picture
 
 MOST_BYTES = 96 * 2**20  # 400 photos of the tray, or 3,500 atoms
 

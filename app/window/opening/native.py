@@ -7,8 +7,8 @@ from pathlib import Path
 
 from imgui_bundle import portable_file_dialogs
 
-from langflash_core.formats import FILMS_IN, PHOTOS_IN
-from langflash_core.outputs import SCENES_IN
+from langflash_core.base.formats import FILMS_IN, PHOTOS_IN
+from langflash_core.base.outputs import SCENES_IN
 
 _HELPERS = ("zenity", "matedialog", "qarma", "kdialog")  # what portable-file-dialogs calls on Linux
 

@@ -11,8 +11,8 @@ from pathlib import Path
 import numpy as np
 from PIL import Image, ImageGrab
 
+from langflash_core.base.files import make_folder, write_atomically
 from langflash_core.errors import Cancelled, ImageError, LangFlashError
-from langflash_core.files import make_folder, write_atomically
 
 from ...places import state_folder
 from ..commands import Command, ShowPicture

@@ -5,8 +5,8 @@ from dataclasses import dataclass, replace
 from itertools import zip_longest
 from pathlib import Path
 
+from langflash_core.base.pictures import NAMED
 from langflash_core.geometry.poses import Pose
-from langflash_core.pictures import NAMED
 
 from ..asking.state import PALETTE, Prompt
 from ..commands import Notify

@@ -42,7 +42,7 @@ def keep(
     Raises:
         OutputError: the folder cannot be written.
     """
-    from langflash_core.files import make_folder
+    from langflash_core.base.files import make_folder
     from langflash_core.scene.edits_file import save_history, scene_digest
     from langflash_core.scene.file import save
 

@@ -9,7 +9,7 @@ from contextlib import suppress
 from pathlib import Path
 from typing import BinaryIO
 
-from langflash_core.files import make_folder, write_atomically
+from langflash_core.base.files import make_folder, write_atomically
 from langflash_core.scene.edits import History
 
 from ...places import state_folder

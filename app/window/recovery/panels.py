@@ -5,8 +5,8 @@ from dataclasses import replace
 from imgui_bundle import ImVec2, imgui
 from imgui_bundle import icons_fontawesome_6 as fa
 
-from langflash_core.detail import DETAILS
-from langflash_core.formats import COLOUR_MAPS
+from langflash_core.base.detail import DETAILS
+from langflash_core.base.formats import COLOUR_MAPS
 
 from .. import commands as do
 from ..kit import boxes, theme, widgets

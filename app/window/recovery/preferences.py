@@ -11,10 +11,10 @@ from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 from typing import Any
 
-from langflash_core.detail import DEFAULT_DETAIL, DETAILS
+from langflash_core.base.detail import DEFAULT_DETAIL, DETAILS
+from langflash_core.base.files import make_folder, write_atomically
+from langflash_core.base.formats import COLOUR_MAPS
 from langflash_core.errors import OutputError
-from langflash_core.files import make_folder, write_atomically
-from langflash_core.formats import COLOUR_MAPS
 
 from ...places import config_folder
 from .locks import one_at_a_time

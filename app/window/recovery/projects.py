@@ -17,8 +17,8 @@ import numpy as np
 from jaxtyping import UInt8
 from PIL import Image, ImageOps
 
-from langflash_core.files import make_folder, write_atomically
-from langflash_core.picture_files import opened_picture
+from langflash_core.base.files import make_folder, write_atomically
+from langflash_core.base.picture_files import opened_picture
 
 from ...places import PICTURE, project_file, projects_folder
 from .sessions import DAMAGED, fields, understood

@@ -9,7 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from langflash_core.files import make_folder
+from langflash_core.base.files import make_folder
 from langflash_core.scene.edits import History, Marks
 
 from ..commands import Command

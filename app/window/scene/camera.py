@@ -4,9 +4,9 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from langflash_core.base.pictures import Picture
 from langflash_core.geometry import poses
 from langflash_core.geometry.poses import Pose, Vector
-from langflash_core.pictures import Picture
 
 from ..commands import Notify
 from ..editing.state import Point

@@ -5,9 +5,9 @@ from contextlib import contextmanager, suppress
 from dataclasses import replace
 from pathlib import Path
 
-from langflash_core.colormaps import colour_bar
+from langflash_core.base.colormaps import colour_bar
+from langflash_core.base.formats import COLOUR_MAPS
 from langflash_core.errors import LangFlashError
-from langflash_core.formats import COLOUR_MAPS
 from langflash_core.geometry.poses import Vector
 from langflash_core.reconstruction.networks import Networks
 

@@ -4,9 +4,9 @@ import math
 from collections.abc import Mapping
 from pathlib import Path
 
+from langflash_core.base.records import FoundLens, Record
 from langflash_core.geometry.poses import Pose
 from langflash_core.images.still_names import shown_name
-from langflash_core.records import FoundLens, Record
 
 from .state import Photo, SceneInfo
 

@@ -7,9 +7,9 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Bool
 
+from langflash_core.base.records import World
 from langflash_core.geometry import poses, rotations
 from langflash_core.geometry.poses import Pose, Vector
-from langflash_core.records import World
 from langflash_core.scene.changes import Moved
 from langflash_core.scene.edits import Marks
 from langflash_core.scene.surroundings import Surroundings

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from functools import cache
 from pathlib import Path
 
-from langflash_core.resources import asset_path
+from langflash_core.base.resources import asset_path
 
 from .state import Photo
 

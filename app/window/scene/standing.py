@@ -2,8 +2,8 @@
 
 from dataclasses import dataclass, replace
 
+from langflash_core.base.records import World
 from langflash_core.geometry import poses
-from langflash_core.records import World
 from langflash_core.scene.report import world_line
 
 from ..commands import Notify

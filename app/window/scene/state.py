@@ -5,10 +5,10 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from langflash_core import pictures
+from langflash_core.base import pictures
+from langflash_core.base.pictures import Picture
+from langflash_core.base.records import FoundLens
 from langflash_core.geometry.poses import START, Pose, Vector
-from langflash_core.pictures import Picture
-from langflash_core.records import FoundLens
 from langflash_core.scene.edits import History, Marks
 
 from ..protocol import Command

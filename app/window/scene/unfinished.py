@@ -1,5 +1,5 @@
 """Work on many photos that is kept while it goes on, so that pausing it, or leaving the program, loses
-little: a folder of `langflash_core/keeping.py` for each set of photos, in the user's folder of caches.
+little: a folder of `langflash_core/base/keeping.py` for each set of photos, in the user's folder of caches.
 
 A folder is found again by the photos' sizes and first bytes, wherever they lie and whatever they are called,
 in their order; that nothing is taken for what it is not is up to what the files in it are named by.
@@ -13,10 +13,10 @@ from collections.abc import Iterator, Sequence
 from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 
+from langflash_core.base.files import held_alone
+from langflash_core.base.keeping import forget, holds_steps
+from langflash_core.base.resources import home_folder
 from langflash_core.errors import OutputError
-from langflash_core.files import held_alone
-from langflash_core.keeping import forget, holds_steps
-from langflash_core.resources import home_folder
 
 FEWEST = 4
 """Photos from which on it is worth it: fewer are done in seconds."""

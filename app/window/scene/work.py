@@ -12,12 +12,12 @@ from typing import TYPE_CHECKING
 
 import numpy as np
 
-from langflash_core.detail import DEFAULT_DETAIL
+from langflash_core.base.detail import DEFAULT_DETAIL
+from langflash_core.base.picture_files import STORED, opened_picture
 from langflash_core.errors import ImageError, LangFlashError, SceneFileError
 from langflash_core.geometry.poses import Vector, from_view
 from langflash_core.geometry.reach import median_reach
 from langflash_core.images.still_names import film_of, shown_name
-from langflash_core.picture_files import STORED, opened_picture
 from langflash_core.reconstruction.networks import Networks
 from langflash_core.scene.doubts import doubtful, told_warnings
 from langflash_core.scene.edits import History, Marks
@@ -55,8 +55,8 @@ THUMBNAIL_SIDE = 320  # pixels of the longer side
 @dataclass(frozen=True)
 class ReconstructPhotos(Job):
     """Make a scene of photos; of many it goes on from what was kept (`unfinished`). fovs: degrees of the
-    longer side, one per photo; None: its record. detail: its name, of `langflash_core.detail`. films: what
-    became of the frames of those that photos are of, as `Record.left_out` has it. networks: the session's,
+    longer side, one per photo; None: its record. detail: its name (`base.detail`). films: what became
+    of the frames of those that photos are of, as `Record.left_out` has it. networks: the session's,
     so that weights are read once."""
 
     paths: tuple[Path, ...]
@@ -124,9 +124,9 @@ class JoinScenes(Job):
 
     def run(self, serial: int, progress: Callable[[str, float], None], cancelled: Asked) -> Merged:
         from langflash_core.export import read as read_scene
-        from langflash_core.fused import fused
         from langflash_core.scene.edited import edited_scene, there
         from langflash_core.scene.joining import joined
+        from langflash_core.surface.fused import fused
 
         own, name = self.info, self.path.name
         first, shown = there(own.scene, self.marks), edited_scene(own.scene, self.marks)

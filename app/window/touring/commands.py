@@ -5,7 +5,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 from typing import Any
 
-from langflash_core import pictures
+from langflash_core.base import pictures
 from langflash_core.errors import InputError
 from langflash_core.geometry.poses import Pose, Vector
 from langflash_core.scene.tour import LONGEST_TEXT, Note, Stop, Tour, checked, told_tour

@@ -15,6 +15,7 @@ from pathlib import Path
 import torch
 from torch import Tensor
 
+from langflash_core.base.running import Progress
 from langflash_core.errors import InputError
 from langflash_core.lab.evaluation.labelled import Render, ask_photo, draw_photo, judged_by
 from langflash_core.lab.evaluation.labelled import Tally as PhotoTally
@@ -24,7 +25,6 @@ from langflash_core.lab.evaluation.rooms.run import asked_rooms
 from langflash_core.lab.photos import PhotoFolder
 from langflash_core.language.spaces import language_space
 from langflash_core.network import LangFlashNet
-from langflash_core.running import Progress
 
 BINS = 20
 """Of scores, in the reliability diagram."""

@@ -14,6 +14,7 @@ import numpy as np
 import torch
 from jaxtyping import Float64, Integer
 
+from langflash_core.base.running import Progress
 from langflash_core.lab.evaluation.borders import UNKNOWN, border_f1
 from langflash_core.lab.evaluation.numbers import rounded
 from langflash_core.lab.evaluation.tables import cell
@@ -22,9 +23,8 @@ from langflash_core.lab.photos.fitting import fitted, network_size
 from langflash_core.lab.training.measures import nan_mean
 from langflash_core.lab.training.outlined import Outlined
 from langflash_core.network.guided import GuidedDepthNet
+from langflash_core.network.prior import resize
 from langflash_core.network.semantics.splitting import split_groups
-from langflash_core.network.stereo.prior import resize
-from langflash_core.running import Progress
 
 SMALLEST = 0.0008
 """Share of the photo below which a region is not judged."""

@@ -16,6 +16,7 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Float
 
+from langflash_core.base.running import Progress
 from langflash_core.errors import InputError
 from langflash_core.inventory import Inventory, Thing, inventory
 from langflash_core.inventory.beside import difference
@@ -34,7 +35,6 @@ from langflash_core.lab.rooms.layout import SLACK, Instance, Room
 from langflash_core.lab.rooms.sensor import expose
 from langflash_core.lab.training.measures import nan_mean
 from langflash_core.reconstruction.networks import Networks
-from langflash_core.running import Progress
 from langflash_core.types import Frame
 
 THINGS = 3

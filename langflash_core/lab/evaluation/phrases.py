@@ -22,11 +22,11 @@ import numpy as np
 from jaxtyping import Bool
 from torch import Tensor
 
+from langflash_core.base.running import Progress
 from langflash_core.errors import InputError
 from langflash_core.images.pictures import centre_box
 from langflash_core.lab.evaluation.labelled import Render
 from langflash_core.pipeline import query
-from langflash_core.running import Progress
 from langflash_core.types import QueryResult, Scene
 
 RIGHT, PARTLY, WRONG, MISSED = "right", "partly", "wrong", "missed"

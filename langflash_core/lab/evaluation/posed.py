@@ -18,6 +18,7 @@ import torch
 from PIL import Image
 from torch import Tensor
 
+from langflash_core.base.running import Progress
 from langflash_core.errors import InputError
 from langflash_core.images.lens import Intrinsics
 from langflash_core.images.pictures import centre_box
@@ -37,7 +38,6 @@ from langflash_core.lab.training.measures import abs_rel, align_scale, delta1, n
 from langflash_core.language.answers import COVERED_ALPHA
 from langflash_core.pipeline import reconstruct
 from langflash_core.reconstruction.networks import Networks
-from langflash_core.running import Progress
 from langflash_core.scene.bare import bare_scene
 from langflash_core.types import Camera, Frame, Scene
 

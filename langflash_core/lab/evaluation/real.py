@@ -20,8 +20,9 @@ from jaxtyping import Float
 from PIL import Image, ImageOps
 from torch import Tensor
 
+from langflash_core.base.picture_files import opened_picture
+from langflash_core.base.running import Progress
 from langflash_core.errors import InputError
-from langflash_core.fused import fused
 from langflash_core.images.pictures import centre_box
 from langflash_core.lab.evaluation.labelled import Render
 from langflash_core.lab.evaluation.lpips import Lpips
@@ -29,10 +30,9 @@ from langflash_core.lab.evaluation.numbers import rounded
 from langflash_core.lab.evaluation.real_measures import likeness
 from langflash_core.lab.evaluation.walk_scenes import wordless
 from langflash_core.lab.training.measures import nan_mean
-from langflash_core.picture_files import opened_picture
 from langflash_core.pipeline import reconstruct
 from langflash_core.reconstruction.networks import Networks
-from langflash_core.running import Progress
+from langflash_core.surface.fused import fused
 from langflash_core.types import Camera, Scene
 
 TIMES = 2
@@ -47,7 +47,7 @@ Shown = Callable[[str, str, str, Tensor], None]
 @dataclass(frozen=True)
 class Bench:
     """What scenes are made and judged with. render: draws one in the light of the place. fused: judged
-    is the one surface that formats of splats get (`langflash_core.fused`). alone: whether fewer photos stand
+    is the one surface that formats of splats get (`surface.fused`). alone: whether fewer photos stand
     beside. lpips: None leaves it out."""
 
     render: Render

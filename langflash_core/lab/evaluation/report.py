@@ -12,6 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from langflash_core.base.running import Progress
 from langflash_core.errors import InputError
 from langflash_core.lab.evaluation import labelled, posed
 from langflash_core.lab.evaluation.ablations import study
@@ -45,7 +46,6 @@ from langflash_core.lab.evaluation.tables import COLUMNS, MEASURES, METHODS
 from langflash_core.lab.evaluation.tallies import Shelf, identity, intervals, merged
 from langflash_core.lab.photos import PhotoFolder
 from langflash_core.lab.rooms import RoomRenderer, load_pack
-from langflash_core.running import Progress
 
 WORST, BEST = 6, 2
 """Scenes shown of a section."""

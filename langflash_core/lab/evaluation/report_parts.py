@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from PIL import Image
 
-from langflash_core.files import make_folder, write_atomically
+from langflash_core.base.files import make_folder, write_atomically
 from langflash_core.lab.evaluation.case_tables import span
 from langflash_core.lab.evaluation.sights import Sight
 from langflash_core.lab.evaluation.tables import cell

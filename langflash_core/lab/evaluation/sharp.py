@@ -22,9 +22,10 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from langflash_core.detail import DEFAULT_DETAIL
+from langflash_core.base.detail import DEFAULT_DETAIL
+from langflash_core.base.files import make_folder
+from langflash_core.base.running import Progress
 from langflash_core.errors import InputError
-from langflash_core.files import make_folder
 from langflash_core.lab.evaluation.labelled import Render
 from langflash_core.lab.evaluation.lpips import Lpips
 from langflash_core.lab.evaluation.numbers import rounded
@@ -49,7 +50,6 @@ from langflash_core.lab.evaluation.sides import aligned, camera_of, covered_dept
 from langflash_core.lab.training.measures import nan_mean, psnr
 from langflash_core.pipeline import reconstruct
 from langflash_core.reconstruction.networks import Networks
-from langflash_core.running import Progress
 from langflash_core.scene.file import load, save
 from langflash_core.types import NO_LANGUAGE, Camera, Record, Scene, Semantics
 

@@ -16,6 +16,7 @@ import torch
 from PIL import Image
 from torch import Tensor
 
+from langflash_core.base.resources import asset_path
 from langflash_core.errors import InputError
 from langflash_core.geometry.cameras import invert_rigid
 from langflash_core.images.decode import read_photo
@@ -26,8 +27,7 @@ from langflash_core.lab.photos import LabelledPhoto, PhotoFolder
 from langflash_core.lab.photos.folder import lenses_of
 from langflash_core.lab.rooms import Pack, RoomRenderer, RoomViews, staged_room
 from langflash_core.lab.training.commands import cache_plan
-from langflash_core.resources import asset_path
-from langflash_core.scene.detailed import MOST_ENLARGED
+from langflash_core.surface.detailed import MOST_ENLARGED
 
 _LEFT = re.compile(r"(.+)_left")
 

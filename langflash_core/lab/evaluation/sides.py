@@ -16,6 +16,7 @@ from pathlib import Path
 import numpy as np
 import torch
 
+from langflash_core.base.running import Progress
 from langflash_core.errors import InputError
 from langflash_core.geometry.fusion import DepthView
 from langflash_core.lab.evaluation.labelled import Render
@@ -41,7 +42,6 @@ from langflash_core.lab.training.losses import ssim_map
 from langflash_core.lab.training.measures import nan_mean, psnr
 from langflash_core.language.answers import COVERED_ALPHA
 from langflash_core.reconstruction.networks import Networks
-from langflash_core.running import Progress
 from langflash_core.scene.gaps import filled
 from langflash_core.types import Camera, Frame, Scene
 

@@ -16,9 +16,9 @@ import torch
 from torch import Tensor
 from torch.nn import functional as F
 
+from langflash_core.base.running import Progress, Run, evenly
 from langflash_core.network.model import LangFlashNet, Seen
 from langflash_core.network.semantics.grouping import Groups, group_weights
-from langflash_core.running import Progress, Run, evenly
 from langflash_core.types import Views
 
 STAGES = ("language features", "shared encoder", "grouping", "aggregation", "Gaussian decoder", "all")

@@ -12,6 +12,7 @@ from pathlib import Path
 
 import torch
 
+from langflash_core.base.running import Progress
 from langflash_core.errors import InputError
 from langflash_core.lab.evaluation.labelled import Render, rounded
 from langflash_core.lab.evaluation.metrics import pose_error
@@ -30,7 +31,6 @@ from langflash_core.lab.photos import PhotoFolder
 from langflash_core.lab.photos.folder import lenses_of
 from langflash_core.lab.training.measures import nan_mean
 from langflash_core.reconstruction.networks import Networks
-from langflash_core.running import Progress
 from langflash_core.types import Scene
 
 STRETCHES = 6

@@ -17,13 +17,13 @@ import torch
 from torch import Tensor
 
 from langflash_core import __version__
-from langflash_core.files import make_folder, write_atomically
+from langflash_core.base.files import make_folder, write_atomically
+from langflash_core.base.resources import asset_path
 from langflash_core.lab.evaluation.intervals import bootstrap
 from langflash_core.lab.evaluation.metrics import PoseError, Presence
 from langflash_core.lab.evaluation.segments import ClassQuality, Panoptic
 from langflash_core.network import PRESETS
 from langflash_core.network.checkpoints.store import part_folder
-from langflash_core.resources import asset_path
 
 Item = TypeVar("Item")
 MEASURES = 4

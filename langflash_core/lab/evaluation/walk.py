@@ -20,6 +20,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from langflash_core.base.running import Progress
 from langflash_core.errors import InputError
 from langflash_core.lab.evaluation.alignment import aligned_camera
 from langflash_core.lab.evaluation.labelled import Render
@@ -37,7 +38,6 @@ from langflash_core.lab.evaluation.walk_subjects import Walk
 from langflash_core.lab.photos.fitting import FittedPhoto
 from langflash_core.lab.training.measures import abs_rel, align_scale, delta1, nan_mean, psnr
 from langflash_core.language.answers import COVERED_ALPHA
-from langflash_core.running import Progress
 from langflash_core.scene.gaps import filled
 from langflash_core.types import Camera, Scene
 

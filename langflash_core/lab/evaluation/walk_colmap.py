@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from langflash_core.extras import optional_packages
+from langflash_core.base.optional import optional_packages
 
 SEED = 1
 

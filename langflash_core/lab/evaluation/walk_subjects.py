@@ -33,7 +33,7 @@ from langflash_core.lab.rooms.layout import Room
 from langflash_core.lab.rooms.render import Picture
 from langflash_core.lab.rooms.sensor import expose
 from langflash_core.lab.training.commands import cache_plan
-from langflash_core.scene.detailed import MOST_ENLARGED
+from langflash_core.surface.detailed import MOST_ENLARGED
 
 PHOTOS = (2, 4, 8, 16, 32)
 KEPT = 8

@@ -11,11 +11,11 @@ import numpy as np
 from jaxtyping import Bool, Float, UInt16
 from torch import Tensor
 
+from langflash_core.base.running import Progress
 from langflash_core.lab.labels.clips import Clip
 from langflash_core.lab.labels.masks import cleaned, split_ids, without_gaps, without_parts, without_repeats
 from langflash_core.lab.labels.protocols import ImageTextEncoder, MaskPropagator, MaskProposer
 from langflash_core.lab.labels.storage import ClipLabels, ObjectRow
-from langflash_core.running import Progress
 
 _MOST = 2**16 - 1
 

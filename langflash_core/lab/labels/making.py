@@ -6,9 +6,10 @@ from pathlib import Path
 
 import numpy as np
 
+from langflash_core.base.files import filled_atomically, write_atomically
+from langflash_core.base.running import Progress
 from langflash_core.batch.summary import THUMBNAIL
 from langflash_core.export.colours import label_colours
-from langflash_core.files import filled_atomically, write_atomically
 from langflash_core.lab.labels.clips import Clip, ClipPlace, open_clip
 from langflash_core.lab.labels.collecting import collect
 from langflash_core.lab.labels.following import MotionPropagator
@@ -22,7 +23,6 @@ from langflash_core.lab.labels.storage import ClipLabels, write_labels
 from langflash_core.language.vocabulary import all_phrases
 from langflash_core.network import LangFlashNet, load_network
 from langflash_core.network.semantics.mobile_sam.model import load_mobile_sam
-from langflash_core.running import Progress
 
 REPORT = "report.html"
 _THUMBNAIL = 96  # pixels high

@@ -12,12 +12,12 @@ import torch
 from jaxtyping import Float, UInt8
 from torch import Tensor
 
+from langflash_core.base.running import Run, evenly
 from langflash_core.geometry.cameras import intrinsics_from_fov, pixel_grid, project, transform, unproject
 from langflash_core.images.lens import ASSUMED_FOV
 from langflash_core.images.pictures import fitting_size
 from langflash_core.lab.labels.clips import Clip
 from langflash_core.network import LangFlashNet
-from langflash_core.running import Run, evenly
 from langflash_core.types import Views
 
 Image = UInt8[np.ndarray, "H W 3"]

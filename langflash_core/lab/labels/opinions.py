@@ -20,8 +20,8 @@ import numpy as np
 from jaxtyping import Float32, UInt8
 from PIL import Image
 
+from langflash_core.base.files import make_folder, write_atomically
 from langflash_core.errors import InputError
-from langflash_core.files import make_folder, write_atomically
 from langflash_core.lab.labels.lite import opened_lite
 from langflash_core.lab.photos import PhotoFolder
 

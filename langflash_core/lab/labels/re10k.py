@@ -18,9 +18,9 @@ from pathlib import Path
 import numpy as np
 import torch
 
+from langflash_core.base.files import held_alone
 from langflash_core.batch.sets import check_name
 from langflash_core.errors import InputError
-from langflash_core.files import held_alone
 from langflash_core.lab.labels.clips import INDEX
 from langflash_core.lab.labels.storage import (
     FORMAT,

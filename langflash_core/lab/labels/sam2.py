@@ -15,12 +15,12 @@ from jaxtyping import Float, UInt8, UInt16
 from torch import Tensor
 from torch.nn import functional as F
 
+from langflash_core.base.optional import optional_packages
+from langflash_core.base.torchvision_fix import ensure_torchvision
 from langflash_core.errors import WeightsError
-from langflash_core.extras import optional_packages
 from langflash_core.lab.labels.clips import Clip
 from langflash_core.lab.labels.masks import painted
 from langflash_core.lab.labels.protocols import Following
-from langflash_core.torchvision_fix import ensure_torchvision
 
 _MEAN, _STD = (0.485, 0.456, 0.406), (0.229, 0.224, 0.225)
 

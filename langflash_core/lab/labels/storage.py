@@ -19,9 +19,9 @@ from PIL import Image
 from safetensors import SafetensorError, safe_open
 from safetensors.numpy import save
 
+from langflash_core.base.files import write_atomically
+from langflash_core.base.picture_files import STORED, opened_picture
 from langflash_core.errors import InputError
-from langflash_core.files import write_atomically
-from langflash_core.picture_files import STORED, opened_picture
 
 FORMAT = "langflash-labels-1"
 LABELS = "labels.safetensors"

@@ -28,12 +28,12 @@ import numpy as np
 import torch
 from torch import Tensor
 
+from langflash_core.base.picture_files import opened_picture, stored_shape
 from langflash_core.errors import InputError
 from langflash_core.geometry.cameras import MIRRORED, invert_rigid, turned_camera
 from langflash_core.images.decode import read_photo
 from langflash_core.images.lens import Intrinsics
 from langflash_core.lab.photos.names import CLASSES40, class_of, spoken
-from langflash_core.picture_files import opened_picture, stored_shape
 
 PHOTO_SUFFIXES = (".jpg", ".jpeg", ".png")
 MILLIMETRE = 0.001

@@ -10,12 +10,12 @@ from pathlib import Path
 import numpy as np
 import torch
 
+from langflash_core.base.picture_files import opened_picture
 from langflash_core.errors import InputError
 from langflash_core.lab.photos.matlab import MatFile, open_mat
 from langflash_core.lab.photos.partly import from_panoramas, from_plain, from_polygons, from_things
 from langflash_core.lab.photos.reading import Source, read_json
 from langflash_core.lab.photos.writing import FolderWriter, NameTable
-from langflash_core.picture_files import opened_picture
 
 NYU_FRAME = (41, 45, 601, 471)
 """The usual crop of the 640 x 480 pictures, which have a white frame: left, top, right, bottom."""

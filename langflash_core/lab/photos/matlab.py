@@ -11,8 +11,8 @@ import numpy as np
 from scipy.io import loadmat
 from scipy.io.matlab import MatReadError
 
+from langflash_core.base.optional import optional_packages
 from langflash_core.errors import InputError
-from langflash_core.extras import optional_packages
 
 _HDF5 = b"\x89HDF\r\n\x1a\n"
 _HEADER = 512

@@ -17,12 +17,12 @@ import torch
 from PIL import Image, ImageDraw
 from torch import Tensor
 
+from langflash_core.base.picture_files import opened_picture
 from langflash_core.errors import InputError
 from langflash_core.images.decode import read_photo
 from langflash_core.lab.photos.folder import PHOTO_SUFFIXES
 from langflash_core.lab.photos.reading import Source, read_json
 from langflash_core.lab.photos.writing import FolderWriter, NameTable
-from langflash_core.picture_files import opened_picture
 
 WHITE = 248
 """From which value on a border is no part of the photo."""

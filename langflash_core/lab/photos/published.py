@@ -15,6 +15,7 @@ import torch
 from PIL import Image, UnidentifiedImageError
 from torch import Tensor
 
+from langflash_core.base.picture_files import opened_picture
 from langflash_core.errors import InputError
 from langflash_core.images.decode import read_photo
 from langflash_core.lab.photos.folder import (
@@ -34,7 +35,6 @@ from langflash_core.lab.photos.layouts import (
 from langflash_core.lab.photos.matlab import MatFile, open_mat
 from langflash_core.lab.photos.names import CLASSES40, class_of, spoken
 from langflash_core.lab.photos.reading import read_table
-from langflash_core.picture_files import opened_picture
 
 SCANNET_NAMES = "scannetv2-labels.combined.tsv"
 NO_DEPTH = 65_535

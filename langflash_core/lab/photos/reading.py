@@ -5,8 +5,8 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 
+from langflash_core.base.running import Progress
 from langflash_core.errors import InputError
-from langflash_core.running import Progress
 
 
 @dataclass(frozen=True)

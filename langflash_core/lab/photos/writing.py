@@ -13,8 +13,8 @@ import numpy as np
 from PIL import Image
 from torch import Tensor
 
+from langflash_core.base.files import make_folder, write_atomically
 from langflash_core.errors import InputError
-from langflash_core.files import make_folder, write_atomically
 from langflash_core.lab.photos.names import class_of, spoken
 
 MOST_MILLIMETRES = 65_535

@@ -6,8 +6,8 @@ from pathlib import Path
 
 import numpy as np
 
+from langflash_core.base.files import make_folder, write_atomically
 from langflash_core.errors import InputError
-from langflash_core.files import make_folder, write_atomically
 from langflash_core.lab.rooms.catalogue import HELD_OUT_LIBRARIES, TRAIN_LIBRARIES
 from langflash_core.lab.rooms.pack import build_pack, load_pack
 from langflash_core.lab.rooms.preview import contact_sheet

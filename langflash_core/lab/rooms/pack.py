@@ -17,14 +17,14 @@ import numpy as np
 from jaxtyping import Float, Int, UInt8
 from PIL import Image
 
+from langflash_core.base.files import make_folder, write_atomically
+from langflash_core.base.picture_files import STORED, opened_picture
 from langflash_core.errors import InputError
-from langflash_core.files import make_folder, write_atomically
 from langflash_core.lab.rooms.builtin import KIND_PLAIN, LIBRARY, builtin_models
 from langflash_core.lab.rooms.catalogue import UNSEEN, Archive, Item, default_materials, load_catalogue
 from langflash_core.lab.rooms.mesh import Mesh, index, pose
 from langflash_core.lab.rooms.objfile import PANE, Material, Soup, parse_mtl, parse_obj
 from langflash_core.lab.rooms.parametric import parametric_models, wood_textures
-from langflash_core.picture_files import STORED, opened_picture
 
 FORMAT = 1
 TEXTURE_SIZE = 128

@@ -11,7 +11,7 @@ import moderngl
 import numpy as np
 from jaxtyping import Float, Int
 
-from langflash_core.graphics import Programs, offscreen_context, set_uniforms
+from langflash_core.base.graphics import Programs, offscreen_context, set_uniforms
 from langflash_core.lab.rooms.layout import Instance, Room
 from langflash_core.lab.rooms.pack import Pack
 from langflash_core.lab.rooms.shell import CEILING, FLOOR, WALL, shell_triangles

@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Float, UInt8
 from PIL import Image
 
-from langflash_core.picture_files import opened_picture
+from langflash_core.base.picture_files import opened_picture
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,7 @@ from pathlib import Path
 from types import TracebackType
 from typing import Any
 
-from langflash_core.extras import optional_packages
+from langflash_core.base.optional import optional_packages
 
 
 class Board:

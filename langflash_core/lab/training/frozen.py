@@ -19,7 +19,7 @@ import torch
 from safetensors.torch import load_file, save
 from torch import Tensor
 
-from langflash_core.files import make_folder, write_atomically
+from langflash_core.base.files import make_folder, write_atomically
 from langflash_core.lab.training.batches import Frozen, SceneBatch
 from langflash_core.lab.training.mixing import ToldSet
 from langflash_core.lab.training.shards import dequantise_tokens, quantise_tokens

@@ -16,10 +16,10 @@ import torch
 from PIL import Image, ImageFilter
 from torch import Tensor
 
+from langflash_core.base.picture_files import opened_picture
 from langflash_core.lab.photos import PhotoFolder
 from langflash_core.lab.photos.fitting import drawn_window, fitted
 from langflash_core.lab.photos.folder import LabelledPhoto
-from langflash_core.picture_files import opened_picture
 from langflash_core.types import LUMA
 
 SIZES = ((252, 196), (252, 196), (252, 196), (224, 224), (196, 252), (308, 238))

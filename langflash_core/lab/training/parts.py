@@ -18,7 +18,7 @@ from safetensors import safe_open
 from safetensors.torch import save
 from torch import Tensor
 
-from langflash_core.files import make_folder, write_atomically
+from langflash_core.base.files import make_folder, write_atomically
 from langflash_core.lab.training.batches import SceneBatch, collate
 from langflash_core.lab.training.shards import Label, open_shards
 from langflash_core.lab.training.stages.aggregation import mostly

@@ -45,7 +45,7 @@ from langflash_core.lab.training.teacher import Names, Rows, Teacher, hand_over
 from langflash_core.network.guided import GuidedDepthNet
 from langflash_core.network.model import LangFlashNet
 from langflash_core.network.precision import mixed
-from langflash_core.network.stereo.prior import resize
+from langflash_core.network.prior import resize
 
 HEADS = ("language_head", "decoder", "depth_head")
 MODULES = (*HALVES, *HEADS)

@@ -23,7 +23,7 @@ from safetensors import SafetensorError, safe_open
 from safetensors.torch import save_file
 from torch import Tensor
 
-from langflash_core.files import written_atomically
+from langflash_core.base.files import written_atomically
 
 NOTHING = 255
 

@@ -10,8 +10,8 @@ from typing import Any
 import torch
 from torch import Tensor
 
+from langflash_core.base.files import write_atomically
 from langflash_core.errors import InputError
-from langflash_core.files import write_atomically
 from langflash_core.lab.saving import save_whole
 from langflash_core.lab.training.ranks import leads
 from langflash_core.lab.training.stages.stage import Stage, modules_of

@@ -23,8 +23,8 @@ from langflash_core.lab.training.shards import NOTHING, Label
 from langflash_core.lab.training.stages.pixels import evenly_drawn, nearest
 from langflash_core.network.encoders.shared import Tokens, tokens_to_maps
 from langflash_core.network.presets import GuidedDepth
+from langflash_core.network.prior import resize
 from langflash_core.network.semantics.features import LanguageHead, TaughtReader
-from langflash_core.network.stereo.prior import resize
 
 HIDDEN = 0.1
 """Share of token channels that are hidden from it."""

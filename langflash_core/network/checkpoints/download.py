@@ -11,9 +11,9 @@ import urllib.request
 from dataclasses import dataclass
 from pathlib import Path
 
+from langflash_core.base.files import make_folder
+from langflash_core.base.running import Progress
 from langflash_core.errors import DownloadError
-from langflash_core.files import make_folder
-from langflash_core.running import Progress
 
 TIMEOUT = 30.0  # seconds without a byte
 _BLOCK = 1 << 20

@@ -14,8 +14,8 @@ from jaxtyping import Shaped
 from safetensors.torch import save
 from torch import Tensor
 
+from langflash_core.base.files import make_folder, write_atomically
 from langflash_core.errors import WeightsError
-from langflash_core.files import make_folder, write_atomically
 from langflash_core.network.build import build_network, network_class
 from langflash_core.network.checkpoints.parts import TRAINED_HERE, write_part
 from langflash_core.network.checkpoints.store import assemble_network, finite

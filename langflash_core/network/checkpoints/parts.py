@@ -19,12 +19,12 @@ from safetensors import SafetensorError, safe_open
 from safetensors.torch import save_file
 from torch import Tensor
 
+from langflash_core.base.files import written_atomically
+from langflash_core.base.resources import weights_folder
 from langflash_core.errors import WeightsError
-from langflash_core.files import written_atomically
 from langflash_core.network.checkpoints.catalogue import trained_side
 from langflash_core.network.checkpoints.origins import COPY
 from langflash_core.network.presets import PointMaps, Preset
-from langflash_core.resources import weights_folder
 
 FORMAT = "langflash-part-1"
 REMEDY = "import the checkpoint again with `langflash weights import`"

@@ -13,8 +13,9 @@ from safetensors import SafetensorError, safe_open
 from safetensors.torch import save_file
 from torch import Tensor
 
+from langflash_core.base.files import written_atomically
+from langflash_core.base.resources import weights_folder
 from langflash_core.errors import WeightsError
-from langflash_core.files import written_atomically
 from langflash_core.network.build import build_network
 from langflash_core.network.checkpoints.catalogue import trained_side
 from langflash_core.network.checkpoints.importing import convert, read_checkpoint, shaped
@@ -32,7 +33,6 @@ from langflash_core.network.checkpoints.sharing import mismatch, settle
 from langflash_core.network.checkpoints.stored import ALIGNMENT
 from langflash_core.network.model import LangFlashNet
 from langflash_core.network.presets import PointMaps, Preset
-from langflash_core.resources import weights_folder
 
 CLIP_FILE = "clip_vitb32.safetensors"
 

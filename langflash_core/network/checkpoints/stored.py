@@ -17,9 +17,9 @@ import numpy as np
 from jaxtyping import Shaped
 from safetensors import SafetensorError, safe_open
 
+from langflash_core.base.resources import asset_path
+from langflash_core.base.shipped import check_shipped
 from langflash_core.errors import WeightsError
-from langflash_core.resources import asset_path
-from langflash_core.shipped import check_shipped
 
 SCALE = ".scale"
 ALIGNMENT = 64

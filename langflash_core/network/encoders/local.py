@@ -12,7 +12,7 @@ from jaxtyping import Float, Shaped
 from torch import Tensor, nn
 from torch.nn import functional as F
 
-from langflash_core.network.stereo.prior import resize
+from langflash_core.network.prior import resize
 
 DIM = 64
 _ENLARGE = 3  # photos are small here; descriptors of pictures three times as large are 40 % more exact

@@ -16,9 +16,9 @@ from jaxtyping import Float, Shaped
 from torch import Tensor, nn
 from torch.nn import functional as F
 
+from langflash_core.base.torchvision_fix import ensure_torchvision
 from langflash_core.errors import InputError, WeightsError
 from langflash_core.network.checkpoints.importing import read_checkpoint
-from langflash_core.torchvision_fix import ensure_torchvision
 
 CHANNELS = 256
 SIDE = 1024  # pixels of the longer side, as it was trained

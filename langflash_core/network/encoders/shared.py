@@ -7,8 +7,8 @@ import torch
 from jaxtyping import Float
 from torch import Tensor, nn
 
+from langflash_core.base.many import together
 from langflash_core.network.encoders.plain import PlainViT
-from langflash_core.network.many import together
 from langflash_core.network.presets import GuidedDepth
 
 _MEAN = (0.485, 0.456, 0.406)

@@ -7,8 +7,8 @@ from jaxtyping import Float
 from torch import Tensor, nn
 from torch.nn import functional as F
 
+from langflash_core.base.many import groups_of, in_groups
 from langflash_core.network.layers.attention import QueryBlock
-from langflash_core.network.many import groups_of, in_groups
 from langflash_core.network.presets import Preset
 
 _CLOSELY = 32  # views that groups read at half of the features' size; more at less: as many tokens in all

@@ -18,7 +18,7 @@ from langflash_core.network.layers.attention import MLP, QueryBlock
 from langflash_core.network.layers.dpt import DPT
 from langflash_core.network.layers.draws import drawn
 from langflash_core.network.presets import Preset
-from langflash_core.network.stereo.prior import resize
+from langflash_core.network.prior import resize
 
 
 @dataclass(frozen=True)

@@ -1,9 +1,9 @@
 """Groups with MobileSAM's outlines, where its weights are installed: each group's mask in each photo is a
 prompt, and the answer that means the same thing redraws it.
 
-On 13 photos of rooms, then with the photo's borders (`scene.borders`): F1 of borders .497 with neither, .533,
-.564 with the borders alone, .569 with both; with true names for the groups .571, .619, .628, .640. A square
-of 1,024 pixels brings no more than one of 512 (.564, .640) and takes four times as long.
+On 13 photos of rooms, then with the photo's borders (`surface.borders`): F1 of borders .497 with neither,
+.533, .564 with the borders alone, .569 with both; with true names for the groups .571, .619, .628, .640. A
+square of 1,024 pixels brings no more than one of 512 (.564, .640) and takes four times as long.
 
 Sizes: V views, K groups, H W the grid of the weights, h w a photo.
 """
@@ -18,10 +18,10 @@ from jaxtyping import Bool, Float, Float64
 from torch import Tensor
 from torch.nn import functional as F
 
+from langflash_core.base.resources import weights_folder
 from langflash_core.errors import WeightsError
 from langflash_core.network.semantics.mobile_sam.model import Looked, MobileSam, load_mobile_sam
 from langflash_core.network.semantics.mobile_sam.rough import agreement, box, middle
-from langflash_core.resources import weights_folder
 
 FILES = ("mobile_sam.safetensors", "mobile_sam_fp16.safetensors", "mobile_sam.pt")
 """Names under which the weights are looked for."""

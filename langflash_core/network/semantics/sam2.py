@@ -15,9 +15,9 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
+from langflash_core.base.resources import weights_folder
+from langflash_core.base.torchvision_fix import ensure_torchvision
 from langflash_core.errors import WeightsError
-from langflash_core.resources import weights_folder
-from langflash_core.torchvision_fix import ensure_torchvision
 
 CONFIGS = {
     "sam2.1_hiera_tiny.pt": "configs/sam2.1/sam2.1_hiera_t.yaml",

@@ -19,9 +19,9 @@ from jaxtyping import Float
 from torch import Tensor
 from torch.nn import functional as F
 
-from langflash_core.network.many import groups_of, held, in_groups, together
+from langflash_core.base.many import groups_of, held, in_groups, together
 from langflash_core.network.presets import Splitting
-from langflash_core.network.stereo.prior import resize
+from langflash_core.network.prior import resize
 
 _ITERATIONS = 6
 _DIRECTIONS = 32

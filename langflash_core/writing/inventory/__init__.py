@@ -1,7 +1,7 @@
 """The list of what is in a room as tables, as a page to print, and as a plan."""
 
-from langflash_core.files import make_folder, write_atomically
-from langflash_core.formats import kind_of
+from langflash_core.base.files import make_folder, write_atomically
+from langflash_core.base.formats import kind_of
 from langflash_core.inventory import inventory
 from langflash_core.inventory.plan import floor_plan
 from langflash_core.writing.inventory.cutouts import cutouts_of

@@ -8,9 +8,9 @@ import torch
 from PIL import Image
 from torch.nn import functional as F
 
+from langflash_core.base.picture_files import STORED, opened_picture
+from langflash_core.base.running import Progress
 from langflash_core.inventory.things import Inventory
-from langflash_core.picture_files import STORED, opened_picture
-from langflash_core.running import Progress
 from langflash_core.segments import carrying, segmented_view
 from langflash_core.writing.renderers import Renderer
 

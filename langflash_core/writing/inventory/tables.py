@@ -6,10 +6,10 @@ import json
 from dataclasses import asdict
 from typing import Any
 
+from langflash_core.base.records import world_to_json
 from langflash_core.inventory.beside import Difference, Pair
 from langflash_core.inventory.plan import Opening, Plan, PlanWall
 from langflash_core.inventory.things import Inventory, Thing
-from langflash_core.records import world_to_json
 
 COLUMNS = (
     "id", "name", "kind", "sure", "width", "depth", "height", "bottom", "east", "north", "turn", "photos",

@@ -1,7 +1,7 @@
 """How lengths and sureness are said on plans and pages."""
 
+from langflash_core.base.records import Guess
 from langflash_core.inventory.things import Thing
-from langflash_core.records import Guess
 
 SURE = 0.95
 """From here on a thing is what it is called; below it may be."""

@@ -7,15 +7,15 @@ from typing import Any
 import numpy as np
 from torch import Tensor
 
+from langflash_core.base.files import staged_folder
+from langflash_core.base.request import ExportRequest
+from langflash_core.base.running import Progress
 from langflash_core.errors import MissingPackageError
 from langflash_core.export import depth, glb
 from langflash_core.export.colours import label_colours
 from langflash_core.export.paint import depth_picture, write_picture
 from langflash_core.export.png import to_8bit, write_grey, write_labels, write_mask, write_rgb
 from langflash_core.export.sheet import contact_sheet, thumbnail
-from langflash_core.files import staged_folder
-from langflash_core.request import ExportRequest
-from langflash_core.running import Progress
 from langflash_core.types import SegmentedView
 from langflash_core.writing.segmented import manifest
 from langflash_core.writing.subject import Subject, boxes, counted, cut_out, surfaces, views_of

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from typing import Any
 
 from langflash_core import __version__
-from langflash_core.request import ExportRequest
+from langflash_core.base.request import ExportRequest
 from langflash_core.types import Camera
 from langflash_core.writing.subject import Subject, boxes
 

@@ -12,8 +12,8 @@ import torch
 from PIL import Image
 from safetensors.torch import save_file
 
-from langflash_core.outputs import ALL_OUT
-from langflash_core.resources import asset_path
+from langflash_core.base.outputs import ALL_OUT
+from langflash_core.base.resources import asset_path
 
 IDENTITY = torch.eye(4).tolist()
 PINHOLE = [[40.0, 0.0, 28.0], [0.0, 40.0, 21.0], [0.0, 0.0, 1.0]]

@@ -13,8 +13,8 @@ import pytest
 from PIL import Image
 
 from app.cli import main
-from langflash_core.files import held_alone
-from langflash_core.resources import asset_path
+from langflash_core.base.files import held_alone
+from langflash_core.base.resources import asset_path
 
 SMALL = ("--size", "84", "--backend", "torch")
 ASKED = ("--prompt", "plant", "submarine", "--export", ".ply", ".csv", ".json", "transforms.json")

@@ -16,7 +16,7 @@ import torch
 from PIL import Image
 
 import langflash_core
-from langflash_core.pictures import PICTURES
+from langflash_core.base.pictures import PICTURES
 from langflash_core.scene.file import load, save
 from langflash_core.splat import render
 from langflash_core.types import Camera

@@ -7,10 +7,10 @@ import torch
 
 from app.cli.places import open_maker
 from langflash_core import pipeline
+from langflash_core.base.resources import asset_path
 from langflash_core.batch.dispatch import Job
 from langflash_core.batch.order import Order
 from langflash_core.errors import ImageError
-from langflash_core.resources import asset_path
 from langflash_core.scene.file import save
 from tests.app.cli.conftest import stripes
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from langflash_core.resources import asset_path
+from langflash_core.base.resources import asset_path
 
 
 @pytest.fixture

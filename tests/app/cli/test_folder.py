@@ -6,9 +6,9 @@ from pathlib import Path
 import pytest
 
 from langflash_core import pipeline
+from langflash_core.base.resources import asset_path
 from langflash_core.errors import ImageError
 from langflash_core.images.pictures import MAX_PHOTOS
-from langflash_core.resources import asset_path
 
 PHOTO = asset_path("photos/books_left.jpg")
 

@@ -5,8 +5,8 @@ from pathlib import Path
 import pytest
 import torch
 
+from langflash_core.base.resources import asset_path
 from langflash_core.network import PRESETS
-from langflash_core.resources import asset_path
 from langflash_core.scene.file import load
 from tests.network import published
 from tests.network.sizes import TINY

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 
 from langflash_core import pipeline
-from langflash_core.keeping import MATCHES, Keep
-from langflash_core.resources import asset_path
+from langflash_core.base.keeping import MATCHES, Keep
+from langflash_core.base.resources import asset_path
 from tests.app.cli.conftest import stripes
 
 PHOTOS = [asset_path("photos/books_left.jpg"), asset_path("photos/books_right.jpg")]
@@ -27,7 +27,7 @@ def work(monkeypatch) -> dict[str, bool]:
 
     monkeypatch.setattr(pipeline, "reconstruct", reconstruct)
     monkeypatch.setattr(
-        "langflash_core.network.stereo.keypoints.match_sources",
+        "langflash_core.cameras.keypoints.match_sources",
         lambda *_: Matched() if does["match"] else stop(),
     )
     return does

@@ -10,10 +10,10 @@ import pytest
 from PIL import Image
 
 from app.cli import main
+from langflash_core.base.resources import asset_path
 from langflash_core.batch.summary import THUMBNAIL
 from langflash_core.lab.labels.making import REPORT
 from langflash_core.lab.labels.storage import LABELS, read_labels
-from langflash_core.resources import asset_path
 from tests.lab.photos import layouts_made
 from tests.torture.jobs import in_this_process
 

@@ -6,11 +6,11 @@ from pathlib import Path
 import pytest
 import torch
 
+from langflash_core.base.resources import asset_path
 from langflash_core.export import export, read
 from langflash_core.export.cameras import read_posed
 from langflash_core.export.language import side_car
 from langflash_core.lift import VIEWS
-from langflash_core.resources import asset_path
 from tests.app.cli.conftest import stripes
 
 TORCH = ("--backend", "torch")

@@ -13,10 +13,10 @@ import torch
 from PIL import Image
 
 from app.window.scene.drops import SCENE_SUFFIXES
+from langflash_core.base.outputs import ALL_OUT
 from langflash_core.export import READERS, WRITERS, export, read
 from langflash_core.export.language import side_car
 from langflash_core.language.spaces import language_space
-from langflash_core.outputs import ALL_OUT
 from langflash_core.scene.file import save
 from langflash_core.types import Scene
 from tests.app.cli.conftest import HEIGHT, WIDTH, WORDS, stripes

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from langflash_core.resources import asset_path
+from langflash_core.base.resources import asset_path
 
 PHOTO = asset_path("photos/books_left.jpg")
 RUN = """

@@ -12,7 +12,7 @@ import pytest
 from app.cli import main
 from langflash_core.export import export
 from tests.app.cli.conftest import stripes
-from tests.test_picture_files import RED, encoded
+from tests.base.test_picture_files import RED, encoded
 
 _WRITES = os.O_WRONLY | os.O_RDWR | os.O_CREAT
 _seen: list[set[str]] = []

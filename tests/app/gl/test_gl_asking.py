@@ -11,10 +11,10 @@ from app.gl.colours import feature_axes
 from app.gl.painter import Painter
 from app.gl.paints import PAINTS, Wanted
 from app.gl.photos import SAME, WORST, PhotoDepths
-from langflash_core import pictures
-from langflash_core.colormaps import HeatColours, colour_bar
-from langflash_core.formats import COLOUR_MAPS
-from langflash_core.pictures import COUNT_COLOURS
+from langflash_core.base import pictures
+from langflash_core.base.colormaps import HeatColours, colour_bar
+from langflash_core.base.formats import COLOUR_MAPS
+from langflash_core.base.pictures import COUNT_COLOURS
 from langflash_core.splat import render
 from langflash_core.types import Scene
 from tests.app.gl.questions import full_relevance, question

@@ -14,11 +14,11 @@ from app.gl.layered import KEPT, MOVING, LayeredLevel, half
 from app.gl.processor.cell_maps import CellMaps
 from app.gl.processor.still import draw_still
 from app.gl.weights import WeightMaps
+from langflash_core.base.graphics import draws_in_software
+from langflash_core.base.records import Record
 from langflash_core.errors import Cancelled
 from langflash_core.geometry.cameras import invert_rigid
 from langflash_core.geometry.harmonics import colour_to_sh
-from langflash_core.graphics import draws_in_software
-from langflash_core.records import Record
 from langflash_core.scene.changed import changed
 from langflash_core.scene.changes import Moved, Recoloured
 from langflash_core.scene.mask import Mask

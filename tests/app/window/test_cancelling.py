@@ -13,9 +13,9 @@ import pytest
 from app.window.scene import commands as show
 from app.window.scene import work
 from app.window.worker import Worker
-from langflash_core.memory import give_back
+from langflash_core.base.memory import give_back
+from langflash_core.base.resources import asset_path
 from langflash_core.reconstruction.networks import Networks
-from langflash_core.resources import asset_path
 from tests.app.window.test_worker import PATIENCE, wait_for
 
 HEARD_SECONDS = 0.1  # it never waits for the job, only for its turn on a busy machine

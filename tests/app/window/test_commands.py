@@ -15,7 +15,7 @@ from app.window.scene import camera
 from app.window.scene import commands as show
 from app.window.scene.work import describe_scene
 from app.window.state import TOAST_SECONDS, State
-from langflash_core import pictures
+from langflash_core.base import pictures
 from tests.app.window.scenes import after, room, shown_scene
 
 

@@ -24,7 +24,7 @@ HELD_MB = 100  # of the 300 MB of arrays that are gone; what lies apart leaves a
 ARRAYS_AMONG_SMALL_THINGS = """
 import sys
 import numpy as np
-from langflash_core import memory
+from langflash_core.base import memory
 
 def resident_mb():
     lines = open("/proc/self/status").read().splitlines()
@@ -65,7 +65,7 @@ def test_large_arrays_leave_nothing_behind() -> None:
 THREADS_BY_TURNS = """
 import sys
 from threading import Event, Thread
-from langflash_core import memory
+from langflash_core.base import memory
 
 def resident_mb():
     lines = open("/proc/self/status").read().splitlines()

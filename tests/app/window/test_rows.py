@@ -19,9 +19,9 @@ from app.window.recovery import commands as keep
 from app.window.scene.state import Job, Photo
 from app.window.state import State
 from app.window.touring import commands as tour
-from langflash_core import pictures
+from langflash_core.base import pictures
+from langflash_core.base.outputs import OFFERED
 from langflash_core.geometry.poses import Vector
-from langflash_core.outputs import OFFERED
 from tests.app.window.headless import context, frames, look
 from tests.app.window.rows import Rows, clipped, collisions
 from tests.app.window.scenes import after

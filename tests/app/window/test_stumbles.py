@@ -37,7 +37,7 @@ from app.window.scene.panels import views
 from app.window.scene.state import said
 from app.window.state import State
 from app.window.worker import Worker
-from langflash_core import outputs
+from langflash_core.base import outputs
 from langflash_core.network.guided import GuidedDepthNet
 from langflash_core.network.pointmaps import PointMapNet
 from langflash_core.reconstruction.stages import STAGES

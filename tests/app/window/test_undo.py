@@ -31,12 +31,12 @@ from app.window.scene import commands as show
 from app.window.scene.state import SceneInfo
 from app.window.scene.work import describe_scene
 from app.window.state import State
+from langflash_core.base.outputs import OFFERED, Output
+from langflash_core.base.pictures import PICTURES, Picture
 from langflash_core.geometry.poses import Pose, Vector
 from langflash_core.language.relevance import CompiledQuery, compile_query
 from langflash_core.language.spaces import language_space
 from langflash_core.mending.recipes import Recipe
-from langflash_core.outputs import OFFERED, Output
-from langflash_core.pictures import PICTURES, Picture
 from langflash_core.scene.edited import edited_scene
 from langflash_core.scene.edits import Marks, Mask
 from langflash_core.types import Scene

@@ -19,7 +19,7 @@ from app.window.scene.commands import SceneArrived
 from app.window.scene.memory import SceneMemory
 from app.window.state import State
 from app.window.viewport import Viewport
-from langflash_core import pictures
+from langflash_core.base import pictures
 from langflash_core.geometry.poses import from_view, orbit
 from langflash_core.language.relevance import compile_query
 from langflash_core.language.spaces import language_space

@@ -15,11 +15,11 @@ from app.window.requests import Job, Task
 from app.window.scene import commands as show
 from app.window.scene import work
 from app.window.worker import Worker
+from langflash_core.base.resources import asset_path
 from langflash_core.errors import Cancelled
 from langflash_core.language.answers import answer
 from langflash_core.language.relevance import relevance_maps
 from langflash_core.language.spaces import language_space
-from langflash_core.resources import asset_path
 from langflash_core.scene.file import load, save
 from langflash_core.splat import render
 from tests.app.window.scenes import PHRASES, room

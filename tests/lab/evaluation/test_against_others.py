@@ -12,6 +12,7 @@ import pytest
 import torch
 from safetensors.torch import save_file
 
+from langflash_core.base.torchvision_fix import ensure_torchvision
 from langflash_core.lab.evaluation.lpips import Lpips
 from langflash_core.lab.evaluation.metrics import calibration_error
 from langflash_core.lab.evaluation.pictures import ssim
@@ -24,7 +25,6 @@ from langflash_core.lab.training.measures import (
     occurring_mean_iou,
     psnr,
 )
-from langflash_core.torchvision_fix import ensure_torchvision
 
 
 def other(name: str):

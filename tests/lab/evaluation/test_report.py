@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from langflash_core.colormaps import HEAT_STOPS
+from langflash_core.base.colormaps import HEAT_STOPS
 from langflash_core.lab.evaluation import labelled, posed, report_page, sharp
 from langflash_core.lab.evaluation.drawing import drawn_frame
 from langflash_core.lab.evaluation.report import PUBLISHED, Sources, Workplace, plans

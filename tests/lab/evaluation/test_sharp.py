@@ -24,7 +24,7 @@ from langflash_core.lab.evaluation.sharp_subjects import (
 from langflash_core.lab.evaluation.sharp_tables import paired_difference, sharp_markdown
 from langflash_core.lab.photos import PhotoFolder
 from langflash_core.lab.rooms import RoomRenderer, load_pack
-from langflash_core.scene.detailed import MOST_ENLARGED
+from langflash_core.surface.detailed import MOST_ENLARGED
 from langflash_core.types import Camera, Frame, Scene
 from tests.lab.evaluation.real_photos import knowing, write_folder
 from tests.lab.rooms.conftest import TINY_PACK

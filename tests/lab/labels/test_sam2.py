@@ -5,11 +5,11 @@ import numpy as np
 import pytest
 import torch
 
+from langflash_core.base.torchvision_fix import ensure_torchvision
 from langflash_core.errors import WeightsError
 from langflash_core.lab.labels.clips import Clip
 from langflash_core.lab.labels.prompted import PromptedSam
 from langflash_core.lab.labels.sam2 import Sam2Pictures, Sam2Propagator, load_sam2, normalised
-from langflash_core.torchvision_fix import ensure_torchvision
 
 pytest.importorskip("transformers")
 ensure_torchvision()

@@ -15,7 +15,7 @@ from langflash_core.lab.training.live import SIZES, LivePhotos, relit, weathered
 from langflash_core.lab.training.real import TEMPERATURE, KeptPhotos, PhotoTargets, named_loss
 from langflash_core.network.encoders.shared import Tokens
 from langflash_core.network.guided import GuidedDepthNet
-from langflash_core.network.stereo.prior import DepthMaps
+from langflash_core.rig.rig import DepthMaps
 
 NAMES = {
     1: Name("wall", "wall"),

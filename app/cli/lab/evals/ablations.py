@@ -3,8 +3,8 @@
 from argparse import Namespace
 from typing import TextIO
 
+from langflash_core.base.files import check_folder, check_output_file
 from langflash_core.errors import InputError
-from langflash_core.files import check_folder, check_output_file
 
 from ...report import ProgressBar, write_tables
 

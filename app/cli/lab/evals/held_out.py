@@ -2,8 +2,8 @@
 
 from argparse import Namespace
 
+from langflash_core.base.files import check_folder, check_output_file, readable_file
 from langflash_core.errors import InputError
-from langflash_core.files import check_folder, check_output_file, readable_file
 from langflash_core.lab.rooms import Pack, load_pack
 from langflash_core.lab.training.cache import HELD_OUT_SEED
 

@@ -3,14 +3,14 @@
 from argparse import Namespace
 from typing import TextIO
 
-from langflash_core.errors import InputError
-from langflash_core.files import (
+from langflash_core.base.files import (
     check_folder,
     check_output_file,
     filled_atomically,
     readable_file,
     write_atomically,
 )
+from langflash_core.errors import InputError
 from langflash_core.lab.evaluation.clips import clips_markdown, clips_result, judged, rendered_clip
 from langflash_core.lab.labels.making import REPORT, LabelMaker
 from langflash_core.lab.labels.report import report

@@ -9,10 +9,10 @@ from typing import TYPE_CHECKING, TextIO
 import numpy as np
 from PIL import Image, ImageOps
 
+from langflash_core.base.files import check_output_file, make_folder, write_atomically
+from langflash_core.base.formats import is_photo
+from langflash_core.base.picture_files import opened_picture
 from langflash_core.errors import InputError
-from langflash_core.files import check_output_file, make_folder, write_atomically
-from langflash_core.formats import is_photo
-from langflash_core.picture_files import opened_picture
 
 from ...renderers import open_renderer
 from ...report import ProgressBar, write_tables

@@ -6,8 +6,8 @@ from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, TextIO
 
+from langflash_core.base.files import check_folder, check_output_file
 from langflash_core.errors import InputError
-from langflash_core.files import check_folder, check_output_file
 from langflash_core.lab.photos import PhotoFolder, open_folder
 
 from ...renderers import open_renderer

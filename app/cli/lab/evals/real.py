@@ -5,9 +5,9 @@ from argparse import Namespace
 from pathlib import Path
 from typing import TYPE_CHECKING, TextIO
 
+from langflash_core.base.files import check_output_file, make_folder, readable_file, write_atomically
+from langflash_core.base.formats import is_film, is_photo
 from langflash_core.errors import ImageError, InputError
-from langflash_core.files import check_output_file, make_folder, readable_file, write_atomically
-from langflash_core.formats import is_film, is_photo
 
 from ...films import look_through
 from ...renderers import open_renderer

@@ -11,10 +11,10 @@ from pathlib import Path
 from typing import TYPE_CHECKING, TextIO
 
 from langflash_core.__main__ import in_program
+from langflash_core.base.files import check_folder, make_folder, readable_file, write_atomically
+from langflash_core.base.running import Progress
 from langflash_core.errors import InputError, LangFlashError, SceneFileError
-from langflash_core.files import check_folder, make_folder, readable_file, write_atomically
 from langflash_core.lab.photos import PhotoFolder, open_folder
-from langflash_core.running import Progress
 
 from ....bench.machine import host
 from ...renderers import Renderer, open_renderer

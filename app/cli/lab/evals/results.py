@@ -10,8 +10,8 @@ from typing import TextIO
 
 from PIL import Image
 
+from langflash_core.base.files import check_output_file, make_folder, readable_file, write_atomically
 from langflash_core.errors import InputError
-from langflash_core.files import check_output_file, make_folder, readable_file, write_atomically
 
 from ...report import write_tables
 

@@ -6,8 +6,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TYPE_CHECKING, TextIO
 
+from langflash_core.base.files import check_folder, make_folder, readable_file, write_atomically
 from langflash_core.errors import ImageError, InputError, SceneFileError
-from langflash_core.files import check_folder, make_folder, readable_file, write_atomically
 from langflash_core.lab.evaluation.labelled import Render
 from langflash_core.lab.rooms import RoomRenderer, load_pack
 

@@ -7,8 +7,8 @@ from typing import TextIO
 
 from PIL import Image
 
+from langflash_core.base.files import check_folder, readable_file
 from langflash_core.errors import InputError, WeightsError
-from langflash_core.files import check_folder, readable_file
 from langflash_core.lab.evaluation.labelled import Render
 from langflash_core.lab.evaluation.side_subjects import Case
 from langflash_core.lab.rooms import RoomRenderer, load_pack

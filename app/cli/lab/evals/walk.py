@@ -9,8 +9,14 @@ from typing import TYPE_CHECKING, TextIO
 
 from PIL import Image
 
+from langflash_core.base.files import (
+    check_folder,
+    check_output_file,
+    make_folder,
+    readable_file,
+    write_atomically,
+)
 from langflash_core.errors import InputError
-from langflash_core.files import check_folder, check_output_file, make_folder, readable_file, write_atomically
 from langflash_core.lab.rooms import RoomRenderer, load_pack
 
 from ...renderers import Renderer, open_renderer

@@ -9,12 +9,12 @@ from PIL import Image
 from torch import Tensor
 
 from langflash_core import pipeline
+from langflash_core.base.picture_files import opened_picture
 from langflash_core.export.colours import heat
 from langflash_core.export.png import heat_over, to_8bit
 from langflash_core.export.sheet import captioned
 from langflash_core.geometry.cameras import invert_rigid
 from langflash_core.geometry.quaternions import matrices_to_quats, quats_to_matrices
-from langflash_core.picture_files import opened_picture
 from langflash_core.reconstruction.networks import Networks
 from langflash_core.scene.exposure import lit_camera
 from langflash_core.types import Camera, Scene

@@ -13,17 +13,17 @@ import numpy as np
 from PIL import Image
 from torch import Tensor
 
+from langflash_core.base.files import make_folder, write_atomically
+from langflash_core.base.picture_files import opened_picture
+from langflash_core.base.resources import asset_path
 from langflash_core.errors import InputError
 from langflash_core.export.png import to_8bit
 from langflash_core.export.sheet import captioned
-from langflash_core.files import make_folder, write_atomically
 from langflash_core.lab.evaluation.labelled import Render
 from langflash_core.lab.evaluation.side_pictures import SHOWN, room_pictures, scene_pictures
 from langflash_core.lab.evaluation.side_subjects import Case
-from langflash_core.picture_files import opened_picture
 from langflash_core.pipeline import reconstruct
 from langflash_core.reconstruction.networks import Networks
-from langflash_core.resources import asset_path
 from langflash_core.types import Scene
 
 ROOMS = 3

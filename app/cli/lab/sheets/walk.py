@@ -11,12 +11,12 @@ import numpy as np
 from PIL import Image
 from torch import Tensor
 
+from langflash_core.base.files import make_folder, write_atomically
+from langflash_core.base.picture_files import opened_picture
 from langflash_core.errors import InputError
 from langflash_core.export.png import to_8bit
 from langflash_core.export.sheet import captioned
-from langflash_core.files import make_folder, write_atomically
 from langflash_core.lab.evaluation.walk import OWN, TRUTH, Shown
-from langflash_core.picture_files import opened_picture
 
 MOST = 12
 """So many kept frames are shown."""

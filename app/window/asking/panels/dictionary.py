@@ -6,7 +6,7 @@ import numpy as np
 from imgui_bundle import ImVec2, imgui, implot
 from imgui_bundle import icons_fontawesome_6 as fa
 
-from langflash_core import pictures
+from langflash_core.base import pictures
 from langflash_core.scene.edits import Atom
 
 from ... import commands as do

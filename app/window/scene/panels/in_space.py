@@ -5,7 +5,7 @@ import numpy as np
 from imgui_bundle import ImVec2, imgui
 from imgui_bundle import icons_fontawesome_6 as fa
 
-from langflash_core import pictures
+from langflash_core.base import pictures
 from langflash_core.geometry import poses
 from langflash_core.geometry.poses import Pose
 

@@ -2,7 +2,7 @@
 
 from imgui_bundle import ImVec2, ImVec4, imgui
 
-from langflash_core.pictures import Colour, Facts, Legend
+from langflash_core.base.pictures import Colour, Facts, Legend
 
 from ...kit import theme, widgets
 from ...kit.look import Look

@@ -3,8 +3,8 @@
 from imgui_bundle import ImVec2, imgui
 from imgui_bundle import icons_fontawesome_6 as fa
 
-from langflash_core import pictures
-from langflash_core.pictures import GROUPS, KEYED, MISSING, PICTURES, Picture, in_group
+from langflash_core.base import pictures
+from langflash_core.base.pictures import GROUPS, KEYED, MISSING, PICTURES, Picture, in_group
 
 from ... import commands as do
 from ...kit import theme, widgets

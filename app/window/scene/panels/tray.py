@@ -6,10 +6,10 @@ from collections.abc import Iterable
 from imgui_bundle import ImVec2, imgui
 from imgui_bundle import icons_fontawesome_6 as fa
 
+from langflash_core.base.records import FoundLens
+from langflash_core.base.running import left
 from langflash_core.geometry.poses import FOV_RANGE
 from langflash_core.images.still_names import shown_name
-from langflash_core.records import FoundLens
-from langflash_core.running import left
 
 from ... import commands as do
 from ...kit import theme, widgets

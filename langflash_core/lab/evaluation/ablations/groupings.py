@@ -14,8 +14,8 @@ from scipy.cluster.vq import kmeans2
 from torch import Tensor
 from torch.nn import functional as F
 
+from langflash_core.network.prior import resize
 from langflash_core.network.semantics.splitting import condensed
-from langflash_core.network.stereo.prior import resize
 
 EVERY = 4
 """Of the points, a side, that clusters are found on; every point then joins its nearest centre."""

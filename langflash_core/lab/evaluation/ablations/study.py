@@ -14,7 +14,8 @@ from safetensors import SafetensorError, safe_open
 from safetensors.torch import save
 from torch import Tensor
 
-from langflash_core.files import make_folder, write_atomically
+from langflash_core.base.files import make_folder, write_atomically
+from langflash_core.base.running import Progress
 from langflash_core.geometry.cameras import invert_rigid, transform, unproject
 from langflash_core.lab.evaluation.ablations.groupings import point_groups, regrouped, true_names
 from langflash_core.lab.evaluation.drawing import drawn_features, placed_gaussians
@@ -33,8 +34,7 @@ from langflash_core.lab.training.shards import RoomRecord
 from langflash_core.language.channels import Decoder, principal
 from langflash_core.network.model import Seen, pooled_weights
 from langflash_core.network.semantics.aggregation import averaged_atoms
-from langflash_core.running import Progress
-from langflash_core.scene.assemble import renormalised
+from langflash_core.scene.weights import renormalised
 from langflash_core.types import Prediction
 
 KEPT = 8

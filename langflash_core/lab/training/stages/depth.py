@@ -13,7 +13,7 @@ from langflash_core.lab.training.batches import SceneBatch
 from langflash_core.lab.training.losses import depth_loss, error_loss, gradient_loss, log_residual, point_loss
 from langflash_core.lab.training.stages.stage import Loss, Words, as_numbers, guided, pointed, tokens_of
 from langflash_core.network.model import LangFlashNet
-from langflash_core.network.stereo.prior import DepthMaps
+from langflash_core.rig.rig import DepthMaps
 
 
 def depth_stage(network: LangFlashNet, batch: SceneBatch, words: Words) -> Loss:

@@ -10,7 +10,8 @@ from langflash_core.lab.training.stages.depth import scaled_prior
 from langflash_core.lab.training.stages.stage import Loss, Words, chosen_views, guided, tokens_of
 from langflash_core.network.gaussians import assemble_gaussians
 from langflash_core.network.model import LangFlashNet
-from langflash_core.network.stereo.prior import DepthMaps, resize
+from langflash_core.network.prior import resize
+from langflash_core.rig.rig import DepthMaps
 from langflash_core.splat import rasterize, view_colours
 from langflash_core.types import Camera
 

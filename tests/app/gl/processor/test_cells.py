@@ -13,7 +13,7 @@ from app.gl.processor import cell_maps as cell_maps_module
 from app.gl.processor import cells as cells_module
 from app.gl.processor.cells import AtomsOf, batches, cells_of, together
 from app.gl.targets import LayerTarget, read
-from langflash_core.graphics import draws_in_software
+from langflash_core.base.graphics import draws_in_software
 from langflash_core.types import Scene
 from tests.app.gl.processor.test_sprites import drawn
 from tests.splat.scenes import camera, cloud

@@ -9,7 +9,7 @@ import torch
 from app.bench.generated import phrases, room, with_atoms
 from app.gl import SplatRenderer, moving_renderer
 from app.gl.processor.moving import REACH
-from langflash_core.graphics import draws_in_software
+from langflash_core.base.graphics import draws_in_software
 from langflash_core.types import Camera
 
 SIZE = (640, 480)

@@ -9,7 +9,7 @@ import torch
 from app.gl import SplatRenderer
 from app.gl.hardware import CARD, Hardware
 from app.gl.processor.sprites import Sprites
-from langflash_core.graphics import draws_in_software
+from langflash_core.base.graphics import draws_in_software
 from tests.splat.scenes import camera, cloud
 
 

@@ -13,8 +13,8 @@ from app.gl.canvas import Canvas
 from app.gl.processor import still
 from app.gl.processor.still import StillMaps, draw_still
 from app.gl.warming import SIDE, warm_layers, warm_up
+from langflash_core.base.records import Record
 from langflash_core.language.relevance import relevance_maps
-from langflash_core.records import Record
 from langflash_core.splat import render
 from tests.app.gl.questions import full_relevance, psnr, question
 from tests.splat.scenes import camera, cloud, maps_of, turned

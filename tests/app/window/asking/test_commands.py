@@ -15,11 +15,11 @@ from app.window.scene import commands as show
 from app.window.scene.state import possible
 from app.window.scene.work import describe_scene
 from app.window.state import State
-from langflash_core import pictures
+from langflash_core.base import pictures
+from langflash_core.base.pictures import PICTURES, margin_span
 from langflash_core.errors import PromptError
 from langflash_core.language.algebra import terms
 from langflash_core.language.grammar import read
-from langflash_core.pictures import PICTURES, margin_span
 from tests.app.window.scenes import after, room, shown_scene
 
 

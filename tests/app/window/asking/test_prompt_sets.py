@@ -11,7 +11,7 @@ from app.window.asking.prompt_sets import PromptSet, read_prompts, write_prompts
 from app.window.asking.state import PALETTE, Prompt
 from app.window.dialogs import Dialog
 from app.window.state import State
-from langflash_core import pictures
+from langflash_core.base import pictures
 from langflash_core.errors import OutputError, PromptError
 from tests.app.window.scenes import after
 

@@ -15,11 +15,11 @@ from app.window.asking.work import Encode
 from app.window.editing.pointing import AtomsNamed
 from app.window.scene.panels import tray
 from app.window.scene.state import Photo
+from langflash_core.base.resources import asset_path
 from langflash_core.geometry.poses import Vector
 from langflash_core.language.answers import best_places
 from langflash_core.language.hints import reads_foreign
 from langflash_core.language.spaces import language_space
-from langflash_core.resources import asset_path
 from langflash_core.scene.edited import first_marks
 from langflash_core.scene.edits import History
 from langflash_core.splat import render

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 import torch
 
+from langflash_core.base.pictures import KEYED, PICTURES, Picture
 from langflash_core.language.spaces import language_space
-from langflash_core.pictures import KEYED, PICTURES, Picture
 from langflash_core.scene.file import save
 from tests.app.window import test_window
 from tests.app.window.scenes import PHRASES, room

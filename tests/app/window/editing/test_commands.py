@@ -19,7 +19,7 @@ from app.window.scene import commands as show
 from app.window.scene.state import FLIGHT_SECONDS, Job
 from app.window.scene.work import describe_scene
 from app.window.state import State
-from langflash_core import pictures
+from langflash_core.base import pictures
 from langflash_core.scene.edited import edited_scene
 from langflash_core.scene.edits import Combine, Mask
 from tests.app.window.scenes import CHAIR, room

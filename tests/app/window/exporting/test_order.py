@@ -22,9 +22,9 @@ from app.window.scene import commands as show
 from app.window.scene.near import photos_known
 from app.window.scene.state import Photo
 from app.window.state import State
-from langflash_core import outputs
+from langflash_core.base import outputs
+from langflash_core.base.outputs import OFFERED, ROOM, Output
 from langflash_core.geometry.poses import Pose, Vector
-from langflash_core.outputs import OFFERED, ROOM, Output
 from langflash_core.scene.edits import Atom, History, Marks, Mask
 from tests.app.window.scenes import after, told
 from tests.app.window.scenes import shown_scene as scene

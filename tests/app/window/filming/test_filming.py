@@ -18,7 +18,7 @@ from app.window.scene import camera
 from app.window.scene.near import places_to_keep_to
 from app.window.scene.state import FLIGHT_SECONDS
 from app.window.state import State
-from langflash_core import outputs
+from langflash_core.base import outputs
 from langflash_core.geometry import poses
 from langflash_core.geometry.poses import Vector, facing, orbit
 from langflash_core.geometry.tours import along

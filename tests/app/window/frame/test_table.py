@@ -14,7 +14,7 @@ from app.window.kit import theme
 from app.window.recovery import commands as keep
 from app.window.state import State
 from app.window.touring import commands as tour
-from langflash_core import pictures
+from langflash_core.base import pictures
 from langflash_core.scene.edited import first_marks
 from langflash_core.scene.edits import History, Mask
 from tests.app.window import headless

@@ -24,7 +24,7 @@ from app.window.scene.standing import Levelled
 from app.window.scene.state import FLIGHT_SECONDS
 from app.window.scene.work import WriteScene, describe_scene
 from app.window.state import State
-from langflash_core import outputs
+from langflash_core.base import outputs
 from langflash_core.geometry import poses
 from langflash_core.inventory import inventory
 from langflash_core.level import found_world

@@ -17,7 +17,7 @@ from app.window.inventory import commands as take
 from app.window.inventory.state import Row
 from app.window.kit import theme
 from app.window.state import State
-from langflash_core.outputs import ROOM
+from langflash_core.base.outputs import ROOM
 from langflash_core.scene.mask import Mask
 from tests.app.window.headless import context, look
 from tests.app.window.scenes import after

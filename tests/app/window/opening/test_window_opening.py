@@ -8,8 +8,8 @@ import pytest
 from app.window.recovery import preferences, projects
 from app.window.recovery.preferences import DEFAULTS
 from app.window.recovery.state import Kept
+from langflash_core.base.resources import asset_path
 from langflash_core.geometry.poses import Pose, Vector
-from langflash_core.resources import asset_path
 from tests.app.window.test_window import SIZE, TOP, Program, display, pytestmark, scene_file
 
 __all__ = ["display", "pytestmark", "scene_file"]  # fixtures and the mark of the window's tests

@@ -14,7 +14,7 @@ from app.window.recovery.state import Kept, Offer
 from app.window.scene import commands as show
 from app.window.scene.work import describe_scene
 from app.window.state import State
-from langflash_core import pictures
+from langflash_core.base import pictures
 from langflash_core.geometry.poses import Pose, Vector
 from tests.app.window.scenes import after, room
 from tests.app.window.scenes import shown_scene as scene

@@ -23,8 +23,8 @@ from app.window.scene import commands as show
 from app.window.scene.camera import MoveTo, SetMode
 from app.window.scene.state import Room
 from app.window.scene.work import LoadScene, describe_scene
+from langflash_core.base.pictures import DEPTH
 from langflash_core.geometry.poses import Pose, Vector
-from langflash_core.pictures import DEPTH
 from langflash_core.scene.file import save
 from tests.app.window.recovery.desk import Desk
 from tests.app.window.scenes import room

@@ -19,14 +19,14 @@ from app.window.scene.drops import (
     typed_path,
     typed_scene,
 )
+from langflash_core.base.files import write_atomically
+from langflash_core.base.formats import FILMS_IN, PHOTOS_IN
+from langflash_core.base.outputs import SCENES_IN
+from langflash_core.base.picture_files import FORMATS
 from langflash_core.batch.sets import read_sets
 from langflash_core.errors import OutputError
 from langflash_core.export import export
-from langflash_core.files import write_atomically
-from langflash_core.formats import FILMS_IN, PHOTOS_IN
 from langflash_core.images.decode import read_photo
-from langflash_core.outputs import SCENES_IN
-from langflash_core.picture_files import FORMATS
 from tests.app.cli.conftest import stripes
 
 

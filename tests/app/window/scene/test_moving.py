@@ -21,9 +21,9 @@ from app.window.scene.panels import moving
 from app.window.scene.state import FLIGHT_SECONDS, INSISTING, Hold
 from app.window.scene.work import describe_scene
 from app.window.state import State
+from langflash_core.base.records import World
 from langflash_core.geometry import poses, rotations
 from langflash_core.geometry.poses import Pose, Vector
-from langflash_core.records import World
 from langflash_core.scene.edited import first_marks
 from langflash_core.scene.edits import History
 from langflash_core.scene.mask import Mask

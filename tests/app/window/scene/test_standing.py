@@ -19,10 +19,10 @@ from app.window.scene.standing import Levelled, LevelScene
 from app.window.scene.state import FLIGHT_SECONDS
 from app.window.scene.work import FindWorld, WriteScene, describe_scene
 from app.window.state import State
+from langflash_core.base.records import Guess, World
 from langflash_core.geometry import poses, rotations
 from langflash_core.geometry.poses import Vector
 from langflash_core.level import found_world
-from langflash_core.records import Guess, World
 from langflash_core.scene.file import load
 from langflash_core.scene.world import turn_of
 from tests.app.window.scenes import after, shown_scene, told

@@ -21,8 +21,8 @@ from app.window.scene.panels import tray
 from app.window.scene.state import PAUSED, Photo, SceneInfo
 from app.window.scene.work import describe_scene
 from app.window.state import State
+from langflash_core.base.records import FoundLens
 from langflash_core.geometry.cameras import intrinsics_from_fov
-from langflash_core.records import FoundLens
 from tests.app.window import headless
 from tests.app.window.items import Items
 from tests.app.window.scene.test_rooms import Desk

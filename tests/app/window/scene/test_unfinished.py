@@ -13,9 +13,9 @@ from app.window.scene import unfinished, work
 from app.window.scene.state import MOMENTS, PAUSED
 from app.window.state import State
 from langflash_core import pipeline
+from langflash_core.base.files import held_alone
+from langflash_core.base.keeping import Keep
 from langflash_core.errors import Cancelled
-from langflash_core.files import held_alone
-from langflash_core.keeping import Keep
 
 
 @pytest.fixture(autouse=True)

@@ -15,9 +15,9 @@ from app.window.scene.state import FLIGHT_SECONDS
 from app.window.state import State
 from app.window.touring import commands as tour
 from app.window.touring import panel
-from langflash_core import outputs, pictures
+from langflash_core.base import outputs, pictures
+from langflash_core.base.records import Guess, World
 from langflash_core.geometry.poses import Vector, orbit, tour_seconds
-from langflash_core.records import Guess, World
 from langflash_core.scene.tour import NO_TOUR, Note
 from tests.app.window.scenes import after, shown_scene
 

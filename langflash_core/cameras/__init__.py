@@ -1,0 +1,1 @@
+"""Structure from motion: matches, their graph, tracks, poses, lens (`structure.find_poses`)."""

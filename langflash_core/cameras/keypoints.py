@@ -1,0 +1,115 @@
+"""Key points of several photos and which of each pair correspond. Imports no torch: photos are matched
+while torch is still being imported."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import overload
+
+import cv2
+import numpy as np
+from jaxtyping import Float, Int, Shaped, UInt8
+
+from langflash_core.cameras.matching import detect, match_descriptors
+from langflash_core.cameras.retrieval import likely_pairs
+
+Told = Callable[[str, int, int], None]
+
+WORKING_SIDE = 768  # pixels of the longer side at which photos are matched
+_MANY_VIEWS = 4  # beyond this, fewer features keep the pairs affordable
+_FEATURES = {True: 1500, False: 4000}  # of many views, of few
+
+
+@dataclass(frozen=True)
+class KeyPoints:
+    """positions: per view (n, 2), pixels of the photo scaled to `WORKING_SIDE`. pairs: per pair of
+    views i < j that may show the same, rows of both (m, 2) that correspond."""
+
+    positions: tuple[Float[np.ndarray, "_ 2"], ...]
+    pairs: dict[tuple[int, int], Int[np.ndarray, "_ 2"]]
+
+    def arrays(self) -> dict[str, Shaped[np.ndarray, "..."]]:
+        """Both, end to end, to be kept."""
+        rows = list(self.pairs.values())
+        return {
+            "positions": np.concatenate([*self.positions, np.zeros((0, 2))]),
+            "of_views": np.array([len(own) for own in self.positions], np.int64),
+            "edges": np.array(list(self.pairs), np.int64).reshape(-1, 2),
+            "of_edges": np.array([len(own) for own in rows], np.int64),
+            "rows": np.concatenate([*rows, np.zeros((0, 2), np.int64)]),
+        }
+
+    @staticmethod
+    def of(arrays: Mapping[str, Shaped[np.ndarray, "..."]]) -> "KeyPoints":
+        """What `arrays` had."""
+        positions = np.split(arrays["positions"], np.cumsum(arrays["of_views"])[:-1])
+        rows = np.split(arrays["rows"], np.cumsum(arrays["of_edges"])[:-1])
+        edges = (tuple(edge) for edge in arrays["edges"].tolist())
+        return KeyPoints(tuple(positions), dict(zip(edges, rows, strict=False)))
+
+
+def match_sources(
+    sources: tuple[bytes, ...],
+    check: Callable[[], None] = lambda: None,
+    told: Told = lambda what, done, count: None,
+) -> KeyPoints:
+    """`match_photos` of pictures as JPEG bytes."""
+    return match_photos(_Decoded(sources), check, told)
+
+
+class _Decoded(Sequence[np.ndarray]):
+    """Pictures (h, w) uint8 of JPEG bytes, each decoded when it is asked for."""
+
+    def __init__(self, sources: tuple[bytes, ...]):
+        self._sources = sources
+
+    def __len__(self) -> int:
+        return len(self._sources)
+
+    @overload
+    def __getitem__(self, index: int) -> np.ndarray: ...
+    @overload
+    def __getitem__(self, index: slice) -> Sequence[np.ndarray]: ...
+    def __getitem__(self, index: int | slice) -> np.ndarray | Sequence[np.ndarray]:
+        return _Decoded(self._sources[index]) if isinstance(index, slice) else decoded(self._sources[index])
+
+
+def match_photos(
+    greys: Sequence[UInt8[np.ndarray, "_ _"]],
+    check: Callable[[], None] = lambda: None,
+    told: Told = lambda what, done, count: None,
+) -> KeyPoints:
+    """Key points of photos (h, w) uint8 of one shape, and what corresponds; deterministic.
+
+    `check` is called before each photo and each pair; what it raises ends the work. So is `told`, with what
+    is done, how much of it was, and of how much.
+    """
+    limit = _FEATURES[len(greys) > _MANY_VIEWS]
+    positions, descriptors = [], []
+    for number, grey in enumerate(greys):
+        check()
+        told("key points of photos", number, len(greys))
+        own_positions, own_descriptors = detect(_working_size(grey), limit)
+        positions.append(own_positions)
+        descriptors.append(own_descriptors)
+    pairs, likely = {}, likely_pairs(descriptors)
+    for number, (i, j) in enumerate(likely):
+        check()
+        told("matching pairs", number, len(likely))
+        pairs[i, j] = match_descriptors(descriptors[i], descriptors[j])
+    return KeyPoints(tuple(positions), pairs)
+
+
+def decoded(source: bytes) -> UInt8[np.ndarray, "h w"]:
+    """A picture (h, w) uint8, grey, of JPEG bytes."""
+    grey = cv2.imdecode(np.frombuffer(source, np.uint8), cv2.IMREAD_GRAYSCALE)
+    assert grey is not None, "sources are JPEG bytes that images/ wrote"
+    return grey
+
+
+def _working_size(grey: np.ndarray) -> np.ndarray:
+    """Small pictures are enlarged: SIFT needs pixels to find more than a handful of points."""
+    ratio = WORKING_SIDE / max(grey.shape)
+    if ratio == 1:
+        return grey
+    method = cv2.INTER_CUBIC if ratio > 1 else cv2.INTER_AREA
+    return cv2.resize(grey, None, fx=ratio, fy=ratio, interpolation=method)

@@ -1,1 +1,0 @@
-"""Depth and poses of guided geometry: the monocular prior, matches, poses, the plane sweep."""

@@ -1,0 +1,246 @@
+"""A prediction to a scene as fine as its photos: one light, elements of the size that each photo asks
+for, weights with the photo's borders, colours solved for. Composes stages; nothing is learned or fitted
+in shape.
+"""
+
+import math
+import time
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from typing import overload
+
+import torch
+from jaxtyping import Bool
+from torch import Tensor
+from torch.nn import functional as F
+
+from langflash_core.base.at_once import at_once
+from langflash_core.base.detail import Detail
+from langflash_core.base.running import Progress
+from langflash_core.geometry.cameras import invert_rigid
+from langflash_core.geometry.harmonics import colour_to_sh, sh_to_colour
+from langflash_core.images.views import source_picture, source_size
+from langflash_core.rig.rig import Rig
+from langflash_core.scene.report import left_out_line
+from langflash_core.splat.compose import Nearness
+from langflash_core.surface.assemble import placed_views, rig_of
+from langflash_core.surface.colours import ROUNDS, solved_colours
+from langflash_core.surface.detailed import assemble_detailed, working_photo, working_size
+from langflash_core.surface.exposure_compensation import ExposureCompensation, compensate_exposure
+from langflash_core.surface.foreseen import foresight
+from langflash_core.surface.prune import prune
+from langflash_core.surface.transients import transient_masks
+from langflash_core.types import Cost, Prediction, Scene, Views
+
+_HELD = 8  # photos that stay decoded
+_LEFT_OUT = "{} disagrees with the other photos and was left out"
+_LEFT_OUT_OF_SOME = "{} disagree with the other photos and were left out"
+
+
+MOST_LAYERS = 62
+"""Photos that keep one, unless it is said how many Gaussians there may be: the 2.5 million of a scene leave
+40,000 for each, with which two real photos keep .78 and .82 of their structure (80,000: .86 and .90, 12,000:
+.50 and .55)."""
+
+
+@dataclass(frozen=True)
+class Covered:
+    """A scene in its photos' own colours; the photos, all their light in [0, 1]; where they say nothing; and
+    the light of all."""
+
+    scene: Scene
+    photos: "_Photos"
+    left: Bool[Tensor, "V H W"]
+    light: ExposureCompensation
+
+
+@torch.no_grad()
+def covered_scene(
+    prediction: Prediction,
+    views: Views,
+    detail: Detail,
+    *,
+    gaussians: int | None,
+    preset: str,
+    progress: Progress = lambda stage, fraction: None,
+) -> Covered:
+    """The scene of a prediction whose depth maps are surfaces, before colours are solved for: all that needs
+    the prediction, whose maps of many photos are much memory.
+
+    Args:
+        gaussians: about so many; None: as `detail` has it. preset: recorded.
+        progress: called before each step; what it raises ends the work there.
+
+    Raises:
+        InputError: not one usable point in view 0.
+        ValueError: the prediction's sizes disagree, or its poses are not finite.
+    """
+    start = time.perf_counter()
+    progress("light", 0.0)
+    prediction, views = placed_views(prediction, views)
+    rig = rig_of(prediction, views)
+    light = compensate_exposure(rig)
+    grid = (views.images.shape[-2], views.images.shape[-1])
+    photos, whole = _Photos(views, light, grid), _Photos(views, light.whole, grid)
+    views = replace(views, images=light.corrected(views.images).clamp(0, 1))
+    rig = rig_of(prediction, views)  # in the light of all
+    left = transient_masks(rig)
+    bare = left | (False if gaussians else ~_with_layers(prediction)[:, None, None])
+    scene = assemble_detailed(
+        prediction,
+        views,
+        photos,
+        detail,
+        gaussians=gaussians,
+        transients=bare if bool(bare.any()) else None,
+        preset=preset,
+        progress=lambda done: progress("elements", 0.1 + 0.3 * done),
+    )
+    foreseen = _foreseen(rig)
+    timings = {**prediction.timings, "assembly": time.perf_counter() - start}
+    return Covered(scene.with_record(foreseen=foreseen, cost=Cost(timings)), whole, left, light)
+
+
+@torch.no_grad()
+def coloured_scene(covered: Covered, progress: Progress = lambda stage, fraction: None) -> Scene:
+    """The scene in the colours of all its photos, without what nobody sees; `progress` as `covered_scene`."""
+    solving, left = time.perf_counter(), covered.left
+    silent, light = _Silent(covered.photos, left), covered.light
+    scene = _coloured(covered.scene, silent, light, lambda done: progress("colours", 0.4 + 0.5 * done))
+    timings = {**scene.record.cost.timings, "colours": time.perf_counter() - solving}
+    shares = _shares(left)
+    said = (*scene.record.warnings, *_told(shares, scene.record.photos))
+    left_out = {**scene.record.left_out, **shares}
+    record = {"light": covered.light.stored(), "left_out": left_out, "warnings": said}
+    scene = scene.with_record(**record, cost=Cost(timings))
+    progress("prune", 0.9)
+    return prune(scene, merge=False)
+
+
+class _Photos(Sequence[Tensor]):
+    """Photos (3, h, w) at their working size, in the light of all; of more than `_HELD` each is decoded anew
+    whenever it is asked for."""
+
+    def __init__(self, views: Views, light: ExposureCompensation, grid: tuple[int, int]):
+        self._views, self._light, self._grid = views, light, grid
+        self._known: dict[int, Tensor] = {}
+
+    def __len__(self) -> int:
+        return self._views.num_views
+
+    @overload
+    def __getitem__(self, index: int) -> Tensor: ...
+    @overload
+    def __getitem__(self, index: slice) -> Sequence[Tensor]: ...
+    def __getitem__(self, index: int | slice) -> Tensor | Sequence[Tensor]:
+        if isinstance(index, slice):
+            return [self[v] for v in range(*index.indices(len(self)))]
+        if not 0 <= index < len(self):
+            raise IndexError(index)
+        if index in self._known:
+            return self._known[index]
+        photo = working_photo(source_picture(self._views, index), self._grid)
+        photo = self._light.corrected(photo, view=index).clamp(0, 1)
+        if len(self) <= _HELD:
+            self._known[index] = photo
+        return photo
+
+    def size(self, index: int) -> tuple[int, int]:
+        """(width, height) of one."""
+        height, width = working_size(source_size(self._views, index), self._grid)
+        return width, height
+
+
+class _Silent(Sequence[Tensor]):
+    """Photos which say nothing, are no numbers, where `left` (V, H, W) is."""
+
+    def __init__(self, photos: _Photos, left: Tensor):
+        self._photos, self._left = photos, left
+        self._some = left.flatten(1).any(1).tolist()
+
+    def __len__(self) -> int:
+        return len(self._photos)
+
+    @overload
+    def __getitem__(self, index: int) -> Tensor: ...
+    @overload
+    def __getitem__(self, index: slice) -> Sequence[Tensor]: ...
+    def __getitem__(self, index: int | slice) -> Tensor | Sequence[Tensor]:
+        if isinstance(index, slice):
+            return [self[v] for v in range(*index.indices(len(self)))]
+        photo = self._photos[index]
+        if not self._some[index]:
+            return photo
+        left = F.interpolate(self._left[index][None, None].float(), size=photo.shape[-2:], mode="nearest")
+        return torch.where(left[0] > 0, torch.nan, photo)
+
+    def size(self, index: int) -> tuple[int, int]:
+        """(width, height) of one."""
+        return self._photos.size(index)
+
+
+def _foreseen(rig: Rig) -> dict[str, list]:
+    """What a record says of how much of each photo its neighbours foresee: nothing of a single one."""
+    return {} if len(rig) < 2 else foresight(rig).stored()
+
+
+def _shares(left: Tensor) -> dict[str, list[float]]:
+    """What a record says of what was left out of photos (V, H, W): nothing of nothing."""
+    shares = [round(share, 4) for share in left.flatten(1).float().mean(1).tolist()]
+    return {"shares": shares} if any(shares) else {}
+
+
+def _told(left_out: dict[str, list[float]], names: tuple[str, ...]) -> list[str]:
+    """Which photos show what others do not, and how much of them that is; nothing of none."""
+    count, line = sum(share > 0 for share in left_out.get("shares", ())), left_out_line(left_out, names)
+    if count < 2:
+        return [_LEFT_OUT.format(line)] if count else []
+    return [_LEFT_OUT_OF_SOME.format(line)]
+
+
+def _with_layers(prediction: Prediction) -> Bool[Tensor, " V"]:
+    """Which photos keep a layer: all, or `MOST_LAYERS` that lie all over the walk."""
+    poses = prediction.viewmats.cpu().double()
+    depths = prediction.depths[0]
+    usable = depths[torch.isfinite(depths) & (depths > 0)]
+    distance = float(usable.median()) if len(usable) else 1.0
+    centres, axes = invert_rigid(poses)[:, :3, 3].numpy(), poses[:, 2, :3].numpy()
+    kept = Nearness(centres, axes, distance, tuple(range(len(poses)))).spread(MOST_LAYERS)
+    return torch.zeros(len(poses), dtype=torch.bool).index_fill(0, torch.tensor(kept), True)
+
+
+def _coloured(
+    scene: Scene, photos: _Silent, light: ExposureCompensation, progress: Callable[[float], None]
+) -> Scene:
+    """Each photo's layer in the colours that make that photo (3, h, w) again; the record says how near they
+    come.
+
+    What the brightest and the darkest photos show beyond black and white in the light of all is kept:
+    at their places it is seen (`scene.exposure`).
+    """
+    assert scene.view_ids is not None
+    low, high = (ends.float() for ends in light.span)
+    start = sh_to_colour(scene.gaussians.sh, scene.gaussians.means)
+    own = light.whole.gains.square().mean(1).sqrt().tolist()
+    starts = torch.searchsorted(scene.view_ids, torch.arange(len(photos) + 1)).tolist()  # in order of views
+
+    def solved(view: int) -> tuple[Tensor, float]:
+        rows = slice(starts[view], starts[view + 1])
+        found = solved_colours(
+            scene.gaussians.map(lambda values: values[rows]),
+            (start[rows] - low) / (high - low),
+            scene.camera(view, *photos.size(view)),
+            photos[view],
+        )
+        return found.colours, found.psnr[1] + 20 * math.log10(own[view])
+
+    def turns() -> Iterator[int]:
+        for view in range(len(photos)):
+            progress(view / len(photos))
+            if starts[view] < starts[view + 1]:  # it has a layer
+                yield view
+
+    colours, near = zip(*at_once(solved, turns()), strict=True)
+    sh = colour_to_sh(low + (high - low) * torch.cat(colours))[:, None]
+    bought = {**scene.record.detail, "rounds": ROUNDS, "photos_psnr_db": [round(db, 2) for db in near]}
+    return replace(scene, gaussians=replace(scene.gaussians, sh=sh)).with_record(detail=bought)
