@@ -73,7 +73,7 @@ _HOMES = {
     "save": ("export", "export"),
     "load": ("export", "read"),
     "write": ("writing", "write"),
-    "ExportRequest": ("request", "ExportRequest"),
+    "ExportRequest": ("base.request", "ExportRequest"),
     "LangFlashError": ("errors", "LangFlashError"),
 }
 _SELVES = ("inventory",)  # packages of that name, which can be called

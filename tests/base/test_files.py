@@ -72,7 +72,7 @@ def test_only_parts_of_this_computer_and_this_program_are_swept_up(tmp_path):
 
 def test_a_file_name_with_a_line_break_is_swept_up_too(tmp_path):
     child = (
-        "import sys, os; from langflash_core import files; from pathlib import Path\n"
+        "import sys, os; from langflash_core.base import files; from pathlib import Path\n"
         "part = files.part_beside(Path(sys.argv[1]) / 'a\\nb'); part.touch(); os._exit(0)"
     )
     subprocess.run([sys.executable, "-c", child, str(tmp_path)], check=True)

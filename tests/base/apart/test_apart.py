@@ -145,7 +145,7 @@ def no_answer(reader: str, request: dict, content: bytes = b""):
 
 def test_users_get_one_sentence_and_code_2(tmp_path, monkeypatch):
     pytest.importorskip("pxr")
-    for place in ("export.usd", "images.film", "apart"):
+    for place in ("export.usd", "images.film", "base.apart"):
         monkeypatch.setattr(f"langflash_core.{place}.ask", no_answer)
     for name in ("a.usdc", "a.mp4", "a.heic"):
         (tmp_path / name).write_bytes(b"\0\0\0\x18ftypheic" + bytes(99))
