@@ -186,6 +186,7 @@ def semantics_of(
 ) -> Semantics:
     """Over the atoms that have a direction, of ids and values (n, m) of each view's Gaussians over those."""
     ids, values = (torch.cat(parts) for parts in zip(*of_views, strict=True))
+    ids = ids.long()
     dictionary = prediction.dictionary[directed(prediction.dictionary)]
     return Semantics(ids, values, normalize(dictionary.float(), dim=-1), prediction.space)
 

@@ -22,6 +22,8 @@ from langflash_core.surface.upsampling import JUMP
 LEVELS = 4
 LARGEST = 2**LEVELS
 """Pixels, side of the largest squares."""
+_COSTS = (3, 4, *[3] * (LEVELS - 2))
+"""Leaves that a parting adds, by level from the finest: one more goes beneath a square of 4 x 4 pixels."""
 _CLEAR = (0.5, 1.2)  # sides that must be clear around fine and around coarse squares
 _BENT = 0.01  # log depth by which the middle of a square may be off its corners' mean
 
@@ -97,16 +99,18 @@ def grown(
 
 def threshold(trees: list[Tree], budget: int, least: float) -> float:
     """The gain above which squares are parted, at least `least`, so that all trees together have at most
-    about `budget` leaves."""
-    roots = sum(int(tree.wanted[-1].sum()) for tree in trees)
+    `budget` leaves, those beneath squares of four pixels that are parted among them; but what must be parted
+    is parted."""
+    left = budget - sum(int(tree.wanted[-1].sum()) for tree in trees)
     gains = torch.cat([gain.flatten() for tree in trees for gain in tree.gains])
-    gains = gains[gains > least]
-    partings = max(0, (budget - roots) // 3)
-    if partings >= len(gains):
+    levels = zip(_COSTS * len(trees), [gain for tree in trees for gain in tree.gains], strict=True)
+    costs = torch.cat([torch.full((gain.numel(),), cost) for cost, gain in levels])
+    costs, gains = costs[gains > least], gains[gains > least]
+    if int(costs.sum()) <= left:
         return least
-    if partings == 0:
-        return torch.inf
-    return float(gains.kthvalue(len(gains) - partings).values)
+    order = gains.argsort(descending=True)
+    fitting = int((costs[order].cumsum(0) <= left).sum())
+    return float(gains[order[fitting]])
 
 
 def leaves(tree: Tree, limit: float) -> tuple[list[Squares], Squares]:

@@ -227,7 +227,8 @@ def _covers(
     """What covers each photo, and the threshold by which all together have at most about `budget` elements,
     each of which gains `least`."""
     covers = [_Cover.of(sight, detail.finest) for sight in _told(sights, progress, 0.0)]
-    return covers, _limit(covers, budget, least)
+    left = budget - sum(len(cover.behind) for cover in covers)
+    return covers, threshold([cover.tree for cover in covers], left, least)
 
 
 def _made(
@@ -248,24 +249,14 @@ def _made(
         made.append(placed(part, sight.log_depths, sight.depth.slopes, camera, sight.size))
         refined = refined_weights(prediction.weights[view][known].float(), sight.image, sight.photo)
         width = sight.size[1]
-        weights.append(sparse_weights(refined.at(part.pixels // width, part.pixels % width), top_m))
+        ids, values = sparse_weights(refined.at(part.pixels // width, part.pixels % width), top_m)
+        weights.append((ids.short(), values))  # of many photos: a quarter of the memory
         parts.append(part)
         if len(covers) > _HELD:
             give_back()
     names = ("means", "quats", "scales", "opacities", "sh")
     whole = Gaussians(*(torch.cat([getattr(some, name) for some in made]) for name in names))
     return whole, weights, parts
-
-
-def _limit(covers: list[_Cover], budget: int, least: float) -> float:
-    """The threshold of all photos' trees, what goes on behind edges and the ground beneath what is parted
-    counted in."""
-    trees, left = [cover.tree for cover in covers], budget - sum(len(cover.behind) for cover in covers)
-    limit = threshold(trees, max(left, 0), least)
-    for _ in range(2):  # the ground is a fifth of all, and nearly the same from one try to the next
-        beneath = sum(len(leaves(tree, limit)[1]) for tree in trees)
-        limit = threshold(trees, max(left - beneath, 0), least)
-    return limit
 
 
 def _of_view(sight: _Sight, cover: _Cover, limit: float) -> Elements:

@@ -7,7 +7,7 @@ import pytest
 import torch
 from torch import Tensor
 
-from langflash_core.surface.blocks import LARGEST, LEVELS, Squares, grown, leaves, padded, threshold
+from langflash_core.surface.blocks import LARGEST, LEVELS, Squares, Tree, grown, leaves, padded, threshold
 from langflash_core.surface.clearance import clearances
 from langflash_core.surface.upsampling import JUMP
 
@@ -47,6 +47,12 @@ def covered(found: list[Squares], size: tuple[int, int]) -> Tensor:
 
 def count(found: list[Squares]) -> int:
     return sum(len(squares) for squares in found)
+
+
+def counted(tree: Tree, limit: float) -> int:
+    """Leaves, and those beneath."""
+    found, beneath = leaves(tree, limit)
+    return count(found) + len(beneath)
 
 
 def masks(height: int, width: int, seed: int) -> Tensor:
@@ -111,20 +117,20 @@ def test_a_photo_below_the_noise_of_its_numbers_is_not_parted():
 
 
 def test_the_budget_is_kept_and_more_buys_more():
-    """A parting adds three, so up to two are left over, and squares that are parted for the sake of one
-    inside gain the same, up to `LEVELS` of them: all or none."""
+    """A parting adds three or four, so up to three are left over, and squares that are parted for the
+    sake of one inside gain the same, up to `LEVELS` of them: all or none."""
     trees = [
         grown(photo, flat(photo), endless(photo), all_wanted(photo))
         for photo in (noise(64, 64, 1), noise(64, 64, 2))
     ]
-    everything = 2 * 64 * 64
+    everything = 2 * (64 * 64 + 16 * 16)
     before = 0
     for budget in (0, 31, 32, 40, 100, 1000, 3333, everything, 10 * everything):
         limit = threshold(trees, budget, LEAST)
-        made = sum(count(leaves(tree, limit)[0]) for tree in trees)
+        made = sum(counted(tree, limit) for tree in trees)
         assert made <= max(budget, 32) and made >= before
         if budget <= 3333:
-            assert made >= budget - 2 - 3 * (LEVELS - 1)
+            assert made >= budget - 3 - 4 * (LEVELS - 1)
         before = made
     assert before > 0.7 * everything
 
@@ -134,12 +140,13 @@ def test_partings_that_must_be_come_out_of_the_budget_and_on_top_where_it_is_too
     depths = torch.zeros(64, 64)
     depths[:, 33:] = 1
     tree = grown(photo, depths, endless(photo), all_wanted(photo))
-    forced = count(leaves(tree, torch.inf)[0])
-    # Along the edge four squares of each size from 16 on: 4 of 16, 8 of 8, 16 of 4, 32 of 2 are parted.
-    assert forced == 16 + 3 * (4 + 8 + 16 + 32)
+    forced = counted(tree, torch.inf)
+    # Along the edge four squares of each size from 16 on: 4 of 16, 8 of 8, 16 of 4, 32 of 2 are parted,
+    # and 16 lie beneath.
+    assert forced == 16 + 3 * (4 + 8 + 16 + 32) + 16
     for budget in (16, forced, forced + 300):
-        made = count(leaves(tree, threshold([tree], budget, LEAST))[0])
-        assert max(budget, forced) - 2 - 3 * (LEVELS - 1) <= made <= max(budget, forced)
+        made = counted(tree, threshold([tree], budget, LEAST))
+        assert max(budget, forced) - 3 - 4 * (LEVELS - 1) <= made <= max(budget, forced)
 
 
 @pytest.mark.parametrize("upright", [True, False])
