@@ -12,7 +12,6 @@ from torch import Tensor
 from langflash_core.base.many import in_groups
 from langflash_core.base.running import Run
 from langflash_core.cameras.structure import grey_photos
-from langflash_core.depth.agreement import agreed
 from langflash_core.depth.planes import flattened
 from langflash_core.depth.planesweep import searched
 from langflash_core.depth.registration import registered
@@ -20,13 +19,11 @@ from langflash_core.depth.sharpening import sharpened
 from langflash_core.rig.neighbours import source_views
 from langflash_core.rig.rig import Rig
 from langflash_core.rig.settings import (
-    AGREEMENT,
     CHOICE,
     FLATTENING,
     PLANE_SWEEP,
     REGISTRATION,
     SHARPENING,
-    Agreement,
     Choice,
     Flattening,
     PlaneSweep,
@@ -45,7 +42,6 @@ class Surfaces:
     sharpening: Sharpening = SHARPENING
     flattening: Flattening = FLATTENING
     choice: Choice = CHOICE
-    agreement: Agreement = AGREEMENT
     plane_sweep: PlaneSweep = PLANE_SWEEP
     registration: Registration = REGISTRATION
 
@@ -56,8 +52,8 @@ SURFACES = Surfaces()
 def one_surface(
     rig: Rig, guessed: Sequence[int], views: Views, run: Run, settings: Surfaces = SURFACES
 ) -> Rig:
-    """The rig with depth that has the photos' edges and planes; where places are known, it also agrees
-    between photos, to a fraction of their pixels, and has what it had missed.
+    """The rig with depth that has the photos' edges and planes; where places are known, also what the
+    sweep had missed, and photos that meet to a fraction of their pixels.
 
     Args:
         guessed: photos whose place is not known. views: the photos at their own size, where it is at hand.
@@ -75,7 +71,7 @@ def one_surface(
 def _settled(rig: Rig, greys: Sequence[np.ndarray], run: Run, settings: Surfaces) -> Rig:
     """Photos whose places are known."""
     near = source_views(rig, settings=settings.choice)
-    rig = searched(agreed(rig, near, settings.agreement), greys, near, run.check, settings.plane_sweep)
+    rig = searched(rig, greys, near, run.check, settings.plane_sweep)
     rig = sharpen(rig, settings.sharpening)
     told = run.counted("refinement", "photo", range(len(rig)), _SWEPT)
 

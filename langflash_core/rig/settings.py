@@ -7,31 +7,6 @@ from dataclasses import dataclass
 
 
 @dataclass(frozen=True)
-class Agreement:
-    """Depth maps that are bent and blended until they agree (`depth.agreement`)."""
-
-    knots: int = 5
-    """Of a correction, a side: slower than that no map errs."""
-    step: int = 4
-    """Every fourth pixel of a row and of a column is compared for the correction."""
-    iterations: int = 3
-    """Of least squares, each with the weights of what is left of the one before."""
-    scale: float = 0.04
-    """Relative difference from which a pixel speaks less and less (Geman-McClure)."""
-    independent: int = 200
-    """Pixels go together: all compared ones count as this many a view."""
-    expected: float = 0.075
-    """Log depth, standard deviation of a knot where nothing is compared."""
-    bend: float = 0.06
-    """Log depth, standard deviation of a knot against its neighbour."""
-    same: float = 0.06
-    """Maps that differ by less, relatively, show one surface."""
-
-
-AGREEMENT = Agreement()
-
-
-@dataclass(frozen=True)
 class Registration:
     """Depth from what optical flow finds shifted (`depth.registration`)."""
 
