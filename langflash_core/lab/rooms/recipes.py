@@ -37,7 +37,7 @@ _NO_PART = re.compile(r" [-+*/]?= |^(return|continue|break|#|$)")
 _SHORTHAND = (
     (r"(-?\d+)\.\.(-?\d+)", r"draw.count(\1, \2)"),
     (r"(-?[\d.]+)~(-?[\d.]+)", r"draw.between(\1, \2)"),
-    (r"([\d.]+)%", r"draw.chance(\1 / 100)"),
+    (r"(?<![\w.])([\d.]+)%", r"draw.chance(\1 / 100)"),
     (r"\?(\w+)\b(?!\()", r"draw.\1()"),
     (r"\?(?=\w)", "draw."),
     (r"\?\(", "draw.one_of("),
