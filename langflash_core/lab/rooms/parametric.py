@@ -1,55 +1,30 @@
-"""Furniture drawn by rules: endless makes of the things that homes are full of. Metres, y up, front +z.
+"""Furniture drawn by recipes: endless makes of the things that homes are full of. Metres, y up, front +z.
 
 The catalogues hold a handful of models of each class, and a network that has seen four wardrobes
-knows four wardrobes. Each maker draws sizes, proportions, parts and materials anew from a generator,
+knows four wardrobes. Each recipe draws sizes, proportions, parts and materials anew from a generator,
 within what people sell. One library to train on, and one of other makes to validate on; what a
 checkpoint is judged by at the end comes from neither.
 """
 
 import io
+import json
 import zlib
+from pathlib import Path
 
 import numpy as np
 from jaxtyping import Float
 from PIL import Image
 
 from langflash_core.lab.rooms.catalogue import PARAMETRIC, UNSEEN, Item
-from langflash_core.lab.rooms.makers import (
-    animals,
-    appliances,
-    bathing,
-    beds,
-    containers,
-    desks,
-    devices,
-    fire,
-    fittings,
-    furnishing,
-    furniture,
-    greens,
-    hall,
-    kitchen,
-    music,
-    play,
-    seats,
-    small,
-    storage,
-    study,
-    textiles,
-    toys,
-    trifles,
-    washing,
-    water,
-    wheels,
-)
-from langflash_core.lab.rooms.makers.common import NUM_WOODS, Design, Draw, Look, Maker
+from langflash_core.lab.rooms.design import NUM_WOODS, Design, Draw, Look
 from langflash_core.lab.rooms.objfile import Soup, smooth_normals
+from langflash_core.lab.rooms.recipes import drawn
 from langflash_core.lab.rooms.solids import Triangles
 
 _TEXTURE_SIDE = 128
 _TILES_PER_M = 1.3
 _STRETCH = 0.04  # less than one sees on what is round
-_FIRST_UNSEEN = 1000  # copies are counted from here; no maker makes as many
+_FIRST_UNSEEN = 1000  # copies are counted from here; of no recipe are as many made
 _WOOD_TONES = (
     ((0.62, 0.45, 0.28), (0.78, 0.62, 0.43)),
     ((0.30, 0.19, 0.11), (0.45, 0.30, 0.19)),
@@ -59,160 +34,13 @@ _WOOD_TONES = (
     ((0.66, 0.60, 0.53), (0.80, 0.75, 0.68)),
 )
 
-MAKERS: tuple[tuple[Maker, int], ...] = (
-    (furniture.office_chair, 18),
-    (furniture.stool, 20),
-    (furniture.bench, 12),
-    (furniture.pouf, 12),
-    (furniture.coffee_table, 24),
-    (furniture.bedside_table, 20),
-    (furniture.crib, 8),
-    (fittings.base_cabinet, 20),
-    (fittings.wall_cabinet, 12),
-    (fittings.washing_machine, 8),
-    (fittings.microwave, 8),
-    (fittings.sink_unit, 12),
-    (fittings.radiator, 14),
-    (fittings.computer, 24),
-    (fittings.speaker, 12),
-    (small.bottle, 16),
-    (small.bowl, 12),
-    (small.fruit, 10),
-    (small.basket, 10),
-    (washing.towel, 10),
-    (washing.towel_rack, 8),
-    (washing.toilet_paper_holder, 8),
-    (washing.toilet_brush, 8),
-    (washing.bidet, 8),
-    (washing.urinal, 8),
-    (washing.potty, 8),
-    (washing.scale, 8),
-    (washing.soap, 8),
-    (washing.brush, 8),
-    (washing.comb, 8),
-    (washing.cosmetics, 8),
-    (washing.sponge, 8),
-    (washing.drying_rack, 8),
-    (washing.broom, 8),
-    (washing.mat, 8),
-    (washing.water_heater, 8),
-    (washing.mirror, 12),
-    (hall.hanging_clothes, 8),
-    (hall.clothes, 10),
-    (hall.coat_hanger, 8),
-    (hall.fire_extinguisher, 8),
-    (hall.air_conditioner, 8),
-    (hall.fan, 8),
-    (hall.ceiling_fan, 8),
-    (hall.water_cooler, 8),
-    (hall.ladder, 8),
-    (hall.umbrella, 8),
-    (hall.bag, 12),
-    (hall.suitcase, 8),
-    (hall.room_divider, 8),
-    (hall.mannequin, 8),
-    (hall.person, 10),
-    (hall.christmas_tree, 8),
-    (hall.gift, 8),
-    (hall.safe, 8),
-    (hall.aquarium, 8),
-    (kitchen.dishwasher, 8),
-    (kitchen.range_hood, 8),
-    (kitchen.kitchen_island, 10),
-    (kitchen.coffee_machine, 10),
-    (kitchen.kettle, 8),
-    (kitchen.teapot, 8),
-    (kitchen.toaster, 8),
-    (kitchen.kitchen_appliance, 10),
-    (kitchen.pan, 8),
-    (kitchen.kitchen_utensil, 8),
-    (kitchen.jar, 8),
-    (kitchen.tray, 8),
-    (kitchen.salt_shaker, 8),
-    (kitchen.paper_towel_holder, 8),
-    (fire.candle, 8),
-    (fire.ashtray, 8),
-    (kitchen.bread, 8),
-    (kitchen.barrel, 8),
-    (kitchen.high_chair, 8),
-    (fire.firewood, 8),
-    (fire.fireplace, 10),
-    (kitchen.piano, 10),
-    (furnishing.dressing_table, 8),
-    (furnishing.bunk_bed, 8),
-    (textiles.mattress, 8),
-    (textiles.rug, 12),
-    (textiles.curtain, 10),
-    (textiles.blanket, 8),
-    (textiles.cushion, 10),
-    (textiles.picture, 14),
-    (textiles.book, 12),
-    (furnishing.chair, 64),
-    (furnishing.table, 50),
-    (furnishing.lamp, 72),
-    (furnishing.bookcase, 42),
-    (furnishing.cupboard, 40),
-    (devices.keyboard, 8),
-    (devices.phone, 10),
-    (devices.printer, 8),
-    (devices.tablet, 8),
-    (devices.headphones, 8),
-    (devices.game_controller, 8),
-    (devices.remote_control, 8),
-    (devices.player, 8),
-    (devices.camera, 8),
-    (devices.projector, 8),
-    (study.whiteboard, 8),
-    (study.calendar, 8),
-    (study.newspaper, 8),
-    (study.stationery, 8),
-    (study.flashlight, 8),
-    (study.keys, 8),
-    (study.glasses, 8),
-    (study.watch, 8),
-    (study.switch, 8),
-    (study.socket, 8),
-    (study.dartboard, 8),
-    (study.tool, 8),
-    (music.musical_instrument, 12),
-    (play.game_table, 10),
-    (play.fitness_machine, 8),
-    (play.sports_gear, 10),
-    (wheels.bicycle, 10),
-    (wheels.tricycle, 8),
-    (wheels.skateboard, 8),
-    (wheels.stroller, 8),
-    (wheels.wheelchair, 8),
-    (animals.teddy_bear, 8),
-    (animals.cat, 8),
-    (animals.dog, 8),
-    (animals.rabbit, 8),
-    (textiles.sleeping_bag, 8),
-    (toys.toy, 26),
-    (beds.bed, 52),
-    (seats.sofa, 52),
-    (seats.armchair, 44),
-    (desks.desk, 42),
-    (storage.wardrobe, 40),
-    (storage.dresser, 36),
-    (storage.tv_stand, 28),
-    (water.sink, 28),
-    (water.toilet, 22),
-    (bathing.bathtub, 22),
-    (bathing.shower, 20),
-    (appliances.stove, 26),
-    (appliances.refrigerator, 24),
-    (appliances.tv, 24),
-    (greens.plant, 62),
-    (trifles.vase, 28),
-    (trifles.clock, 20),
-    (containers.storage_box, 22),
-    (trifles.cup, 20),
-    (containers.trash_bin, 22),
+PIECES: dict[str, int] = json.loads(
+    (Path(__file__).resolve().parent / "tables" / "made.json").read_text(encoding="utf-8")
 )
-"""What is made and how many of each: the more of it homes hold and the more its makes differ, the more.
+"""Recipes of `furniture/*.txt` that are made, and how many of each: the more of it homes hold and the more
+its makes differ, the more.
 
-A maker's name seeds its draws: makers come and go in any order, and no other make changes."""
+A recipe's name seeds its draws: recipes come and go in any order, and no other make changes."""
 
 
 def parametric_models(copies: float = 1.0, library: str = PARAMETRIC) -> list[tuple[Item, Soup, list[Look]]]:
@@ -227,11 +55,11 @@ def parametric_models(copies: float = 1.0, library: str = PARAMETRIC) -> list[tu
         The same models at every call.
     """
     models, first = [], {PARAMETRIC: 0, UNSEEN: _FIRST_UNSEEN}[library]
-    for maker, count in MAKERS:
-        seed = zlib.crc32(maker.__name__.encode())
+    for name, count in PIECES.items():
+        seed = zlib.crc32(name.encode())
         for copy in range(first, first + max(1, round(count * copies))):
             rng = np.random.default_rng([seed, copy])
-            models.append(_finished(maker(Draw(rng)), f"{maker.__name__}-{copy}", library, rng))
+            models.append(_finished(drawn(name, Draw(rng)), f"{name}-{copy}", library, rng))
     return models
 
 

@@ -1,1 +1,0 @@
-"""Makers of furniture and of what lies about a home, by rules; `rooms.parametric` lists them."""
