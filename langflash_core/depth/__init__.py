@@ -1,1 +1,2 @@
-"""Depth of many photos beside each other: swept, registered, agreed, sharpened (`surfaces.one_surface`)."""
+"""Depth of many photos beside each other: edges, planes, what the sweep missed, registration
+(`surfaces.one_surface`)."""
