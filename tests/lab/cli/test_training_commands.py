@@ -1,4 +1,4 @@
-"""rooms, train, eval, weights: words in, files out; what they compute is tested where it lives."""
+"""rooms, train, eval: words in, files out; what they compute is tested where it lives."""
 
 import json
 from dataclasses import replace
@@ -49,21 +49,6 @@ def test_rooms_render(run, tmp_path):
     files = sorted((tmp_path / "rooms").iterdir())
     assert [path.name for path in files] == ["room_00000003.npz", "room_00000004.npz"]
     assert np.load(files[0])["images"].shape == (3, 56, 70, 3)
-
-
-def test_weights_verify(run, checkpoint):
-    document = run("weights", "verify", checkpoint, "--json").json()
-    (entry,) = document["weights"]
-    assert entry["preset"] == "mini" and entry["sound"] and entry["bytes"] == checkpoint.stat().st_size
-    assert "sound" in run("weights", "verify", checkpoint).out
-
-
-def test_weights_verify_notices_damage(run, checkpoint, tmp_path):
-    content = bytearray(checkpoint.read_bytes())
-    cut = tmp_path / "cut.safetensors"
-    cut.write_bytes(content[: len(content) // 2])
-    outcome = run("weights", "verify", cut)
-    assert outcome.code == 2 and "cut.safetensors" in outcome.err and outcome.out == ""
 
 
 @pytest.mark.parametrize(
