@@ -507,7 +507,7 @@ def test_a_still_picture_of_two_layers_is_blended_of_the_nearest():
     assert psnr(compose.render(doubled(scene), seen).rgb, expected.rgb) < 40
 
 
-def test_a_still_picture_is_the_renderers_marked_and_carried(gl):
+def test_a_still_picture_is_the_renderers_marked(gl):
     scene, seen = layered(3), between(3)
     random, count = np.random.default_rng(0), len(scene.gaussians)
     marks = random.random(count) < 0.7, random.integers(0, 3, count).astype(np.uint8)
@@ -517,10 +517,9 @@ def test_a_still_picture_is_the_renderers_marked_and_carried(gl):
     renderer.draw(seen)
     own, span = renderer.frame(weight_maps=True), renderer.depth_range
     renderer.release()
-    carried = scene.semantics.dense_weights()[:, :3]
-    still = draw_still(scene, seen, marks=marks, carried=carried)
+    still = draw_still(scene, seen, marks=marks)
     assert psnr(still.frame.rgb, own.rgb) >= 50 and still.maps is not None
-    assert (still.maps.weights - maps_of(own)[..., :3]).abs().mean() < 2e-3
+    assert (still.maps.weights - maps_of(own)).abs().mean() < 2e-3
     assert still.depth_range == pytest.approx(span, rel=0.05)  # OpenGL counts what lies just beside the image
 
 
