@@ -40,39 +40,28 @@ class Cleaned:
     counts: Mapping[str, int]
 
 
-def cleaned(
-    scene: Scene,
-    recipe: Recipe,
-    *,
-    visible: Bool[np.ndarray, " N"] | None = None,
-    within: Bool[np.ndarray, " N"] | None = None,
-) -> Cleaned:
+def cleaned(scene: Scene, recipe: Recipe) -> Cleaned:
     """What of a scene a recipe takes away.
-
-    Args:
-        visible: what takes part; None: all. within: where anything may go, beside the recipe's phrases.
 
     Raises:
         InputError: the scene does not know what a rule asks for. PromptError: no Gaussian answers the
         phrases.
     """
-    visible = np.ones(len(scene.gaussians), bool) if visible is None else visible
-    scope = visible if within is None else visible & within
-    if recipe.within:
-        scope = scope & answering(scene, recipe.within)
+    every = np.ones(len(scene.gaussians), bool)
+    scope = answering(scene, recipe.within) if recipe.within else every
     reasons: dict[str, Bool[np.ndarray, " N"]] = {}
     if recipe.strength:
-        found = kind_strengths(scene, visible, recipe.kinds)
+        found = kind_strengths(scene, every, recipe.kinds)
         reasons = {kind: chosen(least, recipe.strength) for kind, least in found.items()}
     for rule in recipe.rules:
         reasons[_said(rule)] = meeting(scene, rule)
     reasons = {name: rows & scope for name, rows in reasons.items()}
     if recipe.invert:
-        found = np.logical_or.reduce([*reasons.values(), np.zeros(len(visible), bool)])
+        found = np.logical_or.reduce([~every, *reasons.values()])
         reasons = {_ALL: scope & ~found}
     if recipe.crop is not None:
-        reasons["outside the box"] = visible & ~inside(scene, box_of(scene, recipe.crop, visible))
-    return _counted(reasons, len(visible))
+        reasons["outside the box"] = ~inside(scene, box_of(scene, recipe.crop, every))
+    return _counted(reasons, len(every))
 
 
 def taken_out(scene: Scene, rows: Bool[np.ndarray, " N"], fill_with: Render | None = None) -> Scene:
