@@ -564,7 +564,6 @@ def add_weights(commands) -> None:
         actions, "get", "download a published checkpoint and convert it; continues where it stopped"
     )
     get.add_argument("name", metavar="NAME", help="a name from `langflash weights list`")
-    get.add_argument("--url", metavar="URL", help="download it from there instead")
     get.add_argument("--keep", action="store_true", help="keep the file as it was downloaded")
     add_json(get)
     imported = new_command(actions, "import", "convert a published checkpoint that is already here")

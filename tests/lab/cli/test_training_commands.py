@@ -179,7 +179,7 @@ def test_train_export_of_nothing(run, checkpoint, tmp_path):
 
 def test_part_and_defaults():
     args = build_parser().parse_args(["lab", "train", "cache", "p.npz", "-o", "out", "--part", "1/2"])
-    assert args.part == (1, 2) and args.set == "train" and args.first_seed is None
+    assert args.part == (1, 2) and args.set == "train"
 
 
 @pytest.fixture

@@ -127,4 +127,4 @@ def _cases(args: Namespace) -> Iterator[tuple[Iterator, int]]:
     readable_file(args.pack, "furniture pack", InputError)
     pack, count = load_pack(args.pack), args.limit or ROOMS
     with RoomRenderer(pack) as renderer:
-        yield room_cases(pack, renderer, kind=args.set, count=count, first=args.first_seed), count
+        yield room_cases(pack, renderer, kind=args.set, count=count), count

@@ -28,8 +28,8 @@ ROOMS, STRETCHES = 20, 4
 WALKS = "walks"
 """The folder of results that keeps single walks."""
 OPTIONS = (
-    "size", "set", "way", "exposure", "blur", "step", "assume_lens", "given_poses", "no_own", "align",
-    "memory", "colmap", "seen_aside", "depth_unit", "crop", "intrinsics", "passers", "screens",
+    "size", "set", "exposure", "blur", "step", "assume_lens", "no_own", "align", "memory",
+    "colmap", "seen_aside", "depth_unit", "crop", "intrinsics", "passers", "screens",
 )  # fmt: skip
 """By which numbers of a walk change."""
 
@@ -120,7 +120,6 @@ def _bench(args: Namespace, renderer: Renderer) -> "Bench":
         args.preset,
         args.size,
         assume_lens=args.assume_lens,
-        given_poses=args.given_poses,
         alone=not args.no_own,
         align=args.align,
         lpips=opened_lpips(args.lpips),
@@ -182,14 +181,4 @@ def _walks(args: Namespace, plan: "Plan") -> "Iterator[tuple[Iterator[Walk], int
         args.exposure or 0.0, args.blur or 0.0, passers=args.passers or 0, screens=args.screens or 0
     )
     with RoomRenderer(pack) as drawer:
-        walks = room_walks(
-            pack,
-            drawer,
-            plan,
-            way=args.way,
-            camcorder=camcorder,
-            kind=args.set,
-            count=count,
-            first=args.first_seed,
-        )
-        yield walks, count
+        yield room_walks(pack, drawer, plan, camcorder=camcorder, kind=args.set, count=count), count

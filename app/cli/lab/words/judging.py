@@ -221,7 +221,6 @@ def _add_level(actions) -> None:
     )
     command.add_argument("pack", type=Path, metavar="PACK", help="furniture, made by rooms pack")
     command.add_argument("--limit", type=whole_count, metavar="N", help="so many rooms (default: 100)")
-    command.add_argument("--first-seed", type=seed, metavar="N", help="(default: of the held-out rooms)")
     command.add_argument(
         "--photos", type=whole_count, default=2, metavar="N", help="of each room (default: 2)"
     )
@@ -237,7 +236,6 @@ def _add_moved(actions) -> None:
     command = new_command(actions, "moved", "what is found of things that were moved between two scenes")
     command.add_argument("pack", type=Path, metavar="PACK", help="furniture, made by rooms pack")
     command.add_argument("--limit", type=whole_count, metavar="N", help="so many rooms (default: 10)")
-    command.add_argument("--first-seed", type=seed, metavar="N", help="(default: of the held-out rooms)")
     command.add_argument(
         "--keep", type=Path, metavar="FOLDER", help="scenes that are made stay there and are read again"
     )
@@ -258,12 +256,6 @@ def _add_walk(actions) -> None:
     _add_walked(command)
     _add_room_set(command)
     command.add_argument(
-        "--way",
-        choices=("aside", "round"),
-        default="aside",
-        help="through a room: sideways, or round its middle, which takes 8 photos (default: aside)",
-    )
-    command.add_argument(
         "--exposure", type=above_zero, metavar="EV", help="each photo of a room is off by up to so many stops"
     )
     command.add_argument(
@@ -276,7 +268,6 @@ def _add_walk(actions) -> None:
         "--screens", type=whole_count, metavar="N", help="a screen shows another picture in so many photos"
     )
     command.add_argument("--assume-lens", action="store_true", help="do not say which lens the photos have")
-    command.add_argument("--given-poses", action="store_true", help="say where the photos were taken")
     command.add_argument(
         "--no-own", action="store_true", help="leave out what a kept frame's own two photos bring alone"
     )
@@ -364,7 +355,6 @@ def _add_room_set(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "--set", choices=("held_out", "validation"), default="held_out", help="of rooms (default: held_out)"
     )
-    command.add_argument("--first-seed", type=seed, metavar="N", help="(default: the set's own range)")
 
 
 def _add_protocol(actions) -> None:
