@@ -18,6 +18,7 @@ from langflash_core.at_once import at_once
 from langflash_core.detail import Detail
 from langflash_core.geometry.cameras import invert_rigid
 from langflash_core.geometry.harmonics import colour_to_sh, sh_to_colour
+from langflash_core.geometry.nearness import Nearness
 from langflash_core.images.views import source_picture, source_size
 from langflash_core.rig.rig import Rig
 from langflash_core.running import Progress
@@ -28,7 +29,6 @@ from langflash_core.scene.prune import prune
 from langflash_core.scene.report import left_out_line
 from langflash_core.scene.transients import transient_masks
 from langflash_core.splat.colours import ROUNDS, solved_colours
-from langflash_core.splat.compose import Nearness
 from langflash_core.splat.foreseen import foresight
 from langflash_core.types import Cost, Prediction, Scene, Views
 

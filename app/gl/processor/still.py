@@ -17,8 +17,9 @@ import torch
 from torch import Tensor
 
 from langflash_core.errors import Cancelled
+from langflash_core.geometry.nearness import NEAREST, Nearness
 from langflash_core.language.relevance import EMPTY_NORM, CompiledQuery
-from langflash_core.splat.compose import NEAREST, Nearness, shares
+from langflash_core.splat.compose import shares
 from langflash_core.splat.projection import (
     ALPHA_MIN,
     NEAR,
