@@ -15,12 +15,12 @@ from .renderer import SplatRenderer
 
 @dataclass(frozen=True)
 class Wanted:
-    """What a picture is to show. colours: (P, 3) of the phrases asked, in their order. cuts: (P,), from which
+    """What a picture is to show. colours: of the P phrases asked, in their order. cuts: P, from which
     relevance on they are there. active: the phrase of a heat-map, shown from `shown_from` on. atom: whose
     weights. shades: of heat-maps, their colour map also of all others."""
 
-    colours: np.ndarray
-    cuts: np.ndarray
+    colours: tuple[tuple[float, float, float], ...]
+    cuts: tuple[float, ...]
     active: int
     shown_from: float
     atom: int
@@ -31,19 +31,19 @@ Paint = Callable[[SplatRenderer, Wanted], moderngl.Texture]
 
 
 def _heat(renderer: SplatRenderer, wanted: Wanted) -> moderngl.Texture:
-    ends = wanted.shades.ends(float(wanted.cuts[wanted.active]))
+    ends = wanted.shades.ends(wanted.cuts[wanted.active])
     return renderer.heat_texture(wanted.active, wanted.shades.colormap, wanted.shown_from, True, ends)
 
 
 def _masks(style: str) -> Paint:
     return lambda renderer, wanted: renderer.mask_texture(
-        style, wanted.colours.astype(np.float32), wanted.cuts.astype(np.float32)
+        style, np.array(wanted.colours, np.float32), np.array(wanted.cuts, np.float32)
     )
 
 
 def _margin(renderer: SplatRenderer, wanted: Wanted) -> moderngl.Texture:
     span = margin_span(len(wanted.cuts))
-    return renderer.margin_texture(float(wanted.cuts[0]), span, wanted.shades.colormap)
+    return renderer.margin_texture(wanted.cuts[0], span, wanted.shades.colormap)
 
 
 def _transmittance(renderer: SplatRenderer, wanted: Wanted) -> moderngl.Texture:
@@ -57,7 +57,7 @@ PAINTS: dict[Picture, Paint] = {
     pictures.RGB: lambda renderer, _: renderer.rgb_texture,
     pictures.HEAT: _heat,
     pictures.LABELS: lambda renderer, wanted: renderer.label_texture(
-        wanted.colours.astype(np.float32), float(wanted.cuts.min())
+        np.array(wanted.colours, np.float32), min(wanted.cuts)
     ),
     pictures.ATOMS: lambda renderer, _: renderer.atom_texture(),
     pictures.DEPTH: lambda renderer, wanted: renderer.depth_texture(wanted.shades.colormap),

@@ -123,7 +123,7 @@ def test_an_atom_out_of_view_weighs_nothing(exact):
 
 def test_transmittance_is_what_passes(asked, truth):
     alphas = render(truth, camera()).alphas.numpy()
-    wanted = Wanted(np.zeros((0, 3)), np.zeros(0), 0, 0.0, 0, HeatColours("grey"))
+    wanted = Wanted((), (), 0, 0.0, 0, HeatColours("grey"))
     picture = PAINTS[pictures.TRANSMITTANCE](asked, wanted)
     np.testing.assert_allclose(pixels(picture)[..., 0], 1 - alphas, atol=STEP)
 
