@@ -55,7 +55,6 @@ def reconstruct(
     grouping: str | None = None,
     detail: str | None = DEFAULT_DETAIL,
     gaussians: int | None = None,
-    refine_seconds: float | None = None,
     viewmats: Tensor | None = None,
     keep: Path | str | None = None,
     progress: Progress | None = None,
@@ -84,8 +83,6 @@ def reconstruct(
         detail: how finely surfaces are covered: "low", "normal", "high"; None: one Gaussian a pixel,
             as the network makes them. Points of `full` are no surfaces: they stay as they are.
         gaussians: about so many, instead of as many as the detail has.
-        refine_seconds: so long poses and one surface of Gaussians, without layers, are fitted to the photos
-            afterwards, and kept so if that brings a view closer that was held out; None: not at all.
         viewmats: poses (V, 4, 4) of the photos, world to camera, in any world and unit: they are not
             sought, and the scene is in that world; preset mini. None: the first photo's camera is the world.
         device: "auto" takes CUDA where there is one; "cpu"; "cuda".
@@ -123,7 +120,6 @@ def reconstruct(
         grouping=grouping,
         detail=detail,
         gaussians=gaussians,
-        refine_seconds=refine_seconds,
         viewmats=viewmats,
         keep=None if keep is None else Path(keep),
     )

@@ -168,8 +168,8 @@ class Record:
     warnings: a sentence each. metric_scale: metres per scene unit. network_unit: the network's
     length units per scene unit. shift: what was taken off the positions of a splat file far from 0, to be put
     back where they are written as doubles; None: nothing. counts: Gaussians predicted and left out. pruning:
-    as `prune` left it. layered: every photo has a whole layer of its own (`splat.compose`). refinement: what
-    a fit to the photos brought. detail: what was spent on how fine elements, and what it bought. light:
+    as `prune` left it. layered: every photo has a whole layer of its own (`splat.compose`).
+    detail: what was spent on how fine elements, and what it bought. light:
     `gains` and `offsets`, a row of red, green and blue for each view, by which `scene.exposure_compensation`
     brought the photos' colours to one light. lens:
     `found`, a mapping of `FoundLens` for each lens that the photos told. left_out:
@@ -197,7 +197,6 @@ class Record:
     shift: Shift | None = None
     counts: Mapping[str, int] = field(default_factory=dict)
     pruning: Mapping[str, int] = field(default_factory=dict)
-    refinement: Mapping[str, Any] = field(default_factory=dict)
     detail: Mapping[str, Any] = field(default_factory=dict)
     light: Mapping[str, Any] = field(default_factory=dict)
     lens: Mapping[str, Any] = field(default_factory=dict)

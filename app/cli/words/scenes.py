@@ -83,13 +83,6 @@ def add_reconstruct(commands) -> None:
         help="auto: bfloat16 on graphics cards and, for full, on processors with instructions for it "
         "(default: auto)",
     )
-    command.add_argument(
-        "--refine",
-        type=above_zero,
-        metavar="SECONDS",
-        help="then spend SECONDS fitting poses and one surface of Gaussians, without layers, to the photos; "
-        "kept only if a held-out photo improves",
-    )
     lens = command.add_mutually_exclusive_group()
     lens.add_argument("--fov", type=open_fov, metavar="DEG", help="field of view of the photos' longer side")
     lens.add_argument(

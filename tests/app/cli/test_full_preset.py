@@ -72,12 +72,10 @@ def test_what_cannot_be_done_is_one_sentence(run, checkpoints, tmp_path):
         (("--grouping", "queries"), "grouping has no weights"),
         (("--grouping", "sam2"), "SAM 2 is not at hand"),
         (("--preset", "mini", "--grouping", "mobile-sam"), "MobileSAM's weights are not at hand"),
-        (("--refine", 99999), "out of range"),
         (("--preset", "mini", "--aggregation", "crops"), "crops are embedded by CLIP"),
     ):
         refused = run(*words, *more)
         assert refused.code == 2 and said in refused.err and refused.err.count("\n") == 1, refused
-    assert "at least two" in run("reconstruct", PHOTOS[0], "--refine", 1, "-o", scene).err
     assert not scene.exists()
 
 
