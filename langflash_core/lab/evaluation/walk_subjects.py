@@ -37,7 +37,6 @@ from langflash_core.scene.detailed import MOST_ENLARGED
 
 PHOTOS = (2, 4, 8, 16, 32)
 KEPT = 8
-RULES = ("same", "apart")
 _MOMENTS = 8  # of an exposure that is blurred
 
 
