@@ -64,7 +64,8 @@ lint: $(STAMP)-dev
 	else echo "The JavaScript of web pages is not checked: no Biome for this machine."; fi
 
 # No more at a time than cores: three on two were quicker by two minutes, and bounds of time were missed.
-PYTEST := $(BIN)/python -m pytest --numprocesses 2 --dist loadfile --no-loadscope-reorder
+# At its end it says what took longest, five seconds and more.
+PYTEST := $(BIN)/python -m pytest --numprocesses 2 --dist loadfile --no-loadscope-reorder --durations=50 --durations-min=5
 test: setup
 	@$(call CHECKED,$(PYTEST) --ignore tests/lab)
 
