@@ -12,7 +12,7 @@ from torch import Tensor
 
 from langflash_core.ahead import Ahead
 from langflash_core.detail import DEFAULT_DETAIL
-from langflash_core.errors import InputError, PromptError, ViewError
+from langflash_core.errors import InputError, ViewError
 from langflash_core.export import opened
 from langflash_core.images.decode import grey_photo
 from langflash_core.images.lens import Intrinsics
@@ -189,21 +189,10 @@ def select(
         PromptError: a prompt or the threshold cannot be used, or no Gaussian passes.
         WeightsError: the language space has no text weights.
     """
-    from langflash_core.meant import meant_relevance
+    from langflash_core.meant import answering
 
     scene, prompts = opened(scene), [prompts] if isinstance(prompts, str) else prompts
-    compiled = compile_spoken(scene, language_space(scene.semantics.space), list(prompts))
-    limit = compiled.threshold if threshold is None else threshold
-    _check_threshold(limit)
-    best = meant_relevance(scene, compiled, [limit] * len(prompts))[0].amax(0)  # (N,)
-    passing = best >= limit if scene.semantics.num_atoms else torch.zeros_like(best, dtype=torch.bool)
-    if not bool(passing.any()):
-        asked, highest = ", ".join(prompts), float(best.max()) if len(best) else 0.0
-        raise PromptError(
-            f"nothing in the scene answers {asked} (best score {highest:.3f}, threshold {limit:.3f}); "
-            "lower the threshold"
-        )
-    return scene.rows(passing)
+    return scene.rows(torch.from_numpy(answering(scene, prompts, threshold)))
 
 
 def web_page(
@@ -281,10 +270,11 @@ def _page_phrases(
         PromptError: a text or the threshold cannot be used.
     """
     from langflash_core.export.html import Phrases
+    from langflash_core.meant import check_threshold
 
     compiled = compile_spoken(scene, language_space(scene.semantics.space), list(texts))  # of heads alone
     limit = compiled.threshold if threshold is None else threshold
-    _check_threshold(limit)
+    check_threshold(limit)
     atoms = compiled.factor  # of which D = atoms Q: products with phrases are the same
     return Phrases(
         texts=compiled.texts,
@@ -315,11 +305,6 @@ def _text_model() -> "TextModel":
         tokens=tuple(sorted(ids, key=lambda token: ids[token])),
         licence="\n".join(licence.read_text(encoding="utf-8") for licence in licences),
     )
-
-
-def _check_threshold(threshold: float) -> None:
-    if not 0 <= threshold <= 1:
-        raise PromptError(f"the threshold {threshold} is out of range; relevancy needs 0 to 1")
 
 
 def best_pair(

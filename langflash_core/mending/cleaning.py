@@ -10,12 +10,10 @@ import numpy as np
 import torch
 from jaxtyping import Bool, Float
 
-from langflash_core.errors import InputError, PromptError
+from langflash_core.errors import InputError
 from langflash_core.geometry.cameras import invert_rigid
 from langflash_core.geometry.harmonics import SH_C0
-from langflash_core.language.spaces import language_space
-from langflash_core.language.spoken import compile_spoken
-from langflash_core.meant import meant_relevance
+from langflash_core.meant import answering
 from langflash_core.scene.instances import disc_radii
 from langflash_core.scene.joining import appended
 from langflash_core.splat.visibility import seen_shares
@@ -75,30 +73,6 @@ def taken_out(scene: Scene, rows: Bool[np.ndarray, " N"], fill_with: Render | No
     gone = torch.from_numpy(rows)
     left = scene.rows(~gone).with_record(num_deleted=scene.record.num_deleted + int(rows.sum()))
     return left if fill_with is None or not rows.any() else appended(left, fill(scene, gone, fill_with))
-
-
-def answering(
-    scene: Scene, phrases: tuple[str, ...], threshold: float | None = None
-) -> Bool[np.ndarray, " N"]:
-    """Gaussians that answer one of some phrases.
-
-    Args:
-        threshold: relevancy in [0, 1]; None: the scene's calibration.
-
-    Raises:
-        PromptError: none does, or a phrase cannot be used. WeightsError: the space has no text weights.
-    """
-    compiled = compile_spoken(scene, language_space(scene.semantics.space), list(phrases))
-    limit = compiled.threshold if threshold is None else threshold
-    best = meant_relevance(scene, compiled, [limit] * len(phrases))[0].amax(0)
-    found = (best >= limit).cpu().numpy() & (scene.semantics.num_atoms > 0)
-    if not found.any():
-        highest = float(best.max()) if len(best) else 0.0
-        raise PromptError(
-            f"nothing in the scene answers {', '.join(phrases)} (best score {highest:.3f}, "
-            f"threshold {limit:.3f}); ask another phrase"
-        )
-    return found
 
 
 def box_of(scene: Scene, crop: str | Box, visible: Bool[np.ndarray, " N"]) -> Box:
