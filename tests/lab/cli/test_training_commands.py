@@ -86,7 +86,7 @@ def test_rooms_render(run, tmp_path):
         ("lab eval sides p.npz --sheet a.png", "give a furniture pack and --results"),
         ("lab eval sides p.npz --lpips gone", "no LPIPS file at gone"),
         ("lab eval sides p.npz --lpips TINY_PACK", "is no safetensors file"),
-        ("lab eval sides-beside gone gone", "no result of eval sides at gone/sides.json"),
+        ("lab eval beside gone gone", "gone holds no result of eval sides or walk"),
         ("lab eval walk", "give either a furniture pack or a folder with --posed"),
         ("lab eval walk p.npz --posed .", "not both"),
         ("lab eval walk gone.npz", "no furniture pack at gone.npz"),
@@ -95,7 +95,6 @@ def test_rooms_render(run, tmp_path):
         ("lab eval walk p.npz --seen-aside", "--seen-aside judges by other photos of a folder"),
         ("lab eval walk p.npz --sheet a.png", "give --results, too"),
         ("lab eval walk p.npz -o table.txt", "this command writes .md"),
-        ("lab eval walk-beside gone gone", "no result of eval walk at gone/walk.json"),
         ("lab eval sharp a.png --pack p.npz", "give photos, a folder with --posed, or furniture"),
         ("lab eval sharp gone.png gone.png", "no photo at gone.png"),
         ("lab eval sharp TINY_PACK", "photos come in pairs, but these are 1"),
@@ -328,7 +327,7 @@ def test_rooms_are_judged_and_shown_from_aside(run, checkpoint, tmp_path, monkey
     assert np.asarray(Image.open(sheet)).std() > 10
     assert len(list((kept / "pictures").iterdir())) == 4 + 4 + 4  # a room, its truth, a pair
     both = tmp_path / "both.png"
-    assert run("lab", "eval", "sides-beside", kept, kept, "--sheet", both).code == 0
+    assert run("lab", "eval", "beside", kept, kept, "--sheet", both).code == 0
     assert np.asarray(Image.open(both)).shape[1] > np.asarray(Image.open(sheet)).shape[1]
 
 
@@ -340,12 +339,10 @@ def test_posed_photos_are_judged_from_aside(run, checkpoint, tmp_path):
     (row,) = outcome.json()["cases"]
     assert row["name"] == "001-007" and {"001", "004"} <= row["looks"].keys()
     table = tmp_path / "new" / "table.md"
-    beside = run("lab", "eval", "sides-beside", tmp_path / "now", tmp_path / "now", "-o", table)
+    beside = run("lab", "eval", "beside", tmp_path / "now", tmp_path / "now", "-o", table)
     assert beside.code == 0 and beside.out == table.read_text()
     assert "| between the photos: PSNR, holes black (dB) |" in beside.out and "+0.000 ± 0.000" in beside.out
-    without = run(
-        "lab", "eval", "sides-beside", tmp_path / "now", tmp_path / "now", "--sheet", tmp_path / "a.png"
-    )
+    without = run("lab", "eval", "beside", tmp_path / "now", tmp_path / "now", "--sheet", tmp_path / "a.png")
     assert without.code == 2 and "holds no pictures" in without.err
     for depths in (posed / "depths").iterdir():
         depths.unlink()
@@ -388,7 +385,7 @@ def test_a_walk_is_judged_kept_and_judged_beside_itself(run, checkpoint, tmp_pat
         photo.write_bytes(b"")
     assert "| PSNR between, whole (dB) |" in run(*words).out
     table, both = tmp_path / "new" / "table.md", tmp_path / "both.png"
-    beside = run("lab", "eval", "walk-beside", kept, kept, "-o", table, "--sheet", both)
+    beside = run("lab", "eval", "beside", kept, kept, "-o", table, "--sheet", both)
     assert beside.code == 0 and beside.out == table.read_text()
     assert "| 3 photos: PSNR between, whole (dB) |" in beside.out and "+0.00 ± 0.00" in beside.out
     assert np.asarray(Image.open(both)).shape[1] > np.asarray(Image.open(sheet)).shape[1]

@@ -1,4 +1,4 @@
-"""`lab eval sides` and `sides-beside`: scenes seen from aside, by one version of the code or by two."""
+"""`lab eval sides`: scenes seen from aside."""
 
 from argparse import Namespace
 from collections.abc import Callable, Iterator
@@ -96,18 +96,6 @@ def _pictures(args: Namespace, render: Render) -> Callable[[Case, Scene], None]:
             shown += 1
 
     return made
-
-
-def beside(args: Namespace, out: TextIO) -> None:
-    """Two results of the same scenes in one table.
-
-    Raises:
-        InputError: a folder holds no results, or they have no scene in common.
-    """
-    check_files(args)
-    from langflash_core.lab.evaluation.side_tables import beside_markdown
-
-    RESULTS.beside(args, beside_markdown, out)
 
 
 @contextmanager

@@ -1,4 +1,4 @@
-"""`lab eval walk` and `walk-beside`: the same place in 2, 4, 8 ... photos, by one version or by two."""
+"""`lab eval walk`: the same place in 2, 4, 8 ... photos."""
 
 from argparse import Namespace
 from collections.abc import Iterator
@@ -143,18 +143,6 @@ def _shelf(args: Namespace, plan: "Plan", bench: "Bench") -> "Shelf":
         "lpips": bench.lpips and bench.lpips.digest,
     }
     return Shelf(args.results / WALKS, key, Tally)
-
-
-def beside(args: Namespace, out: TextIO) -> None:
-    """Two results of the same walks in one table.
-
-    Raises:
-        InputError: a folder holds no results, or they have no walk in common.
-    """
-    check_files(args)
-    from langflash_core.lab.evaluation.walk_tables import beside_markdown
-
-    RESULTS.beside(args, beside_markdown, out)
 
 
 def _write_plot(path: Path, result: dict) -> None:

@@ -76,6 +76,7 @@ def add_eval(commands) -> None:
     _add_sides(actions)
     _add_sharp(actions)
     _add_walk(actions)
+    _add_beside(actions)
     _add_real(actions)
     _add_phrases(actions)
     _add_level(actions)
@@ -162,18 +163,10 @@ def _add_sides(actions) -> None:
     command.add_argument("--limit", type=whole_count, metavar="N", help="rooms or pairs (default: 100 or 40)")
     command.add_argument("--lpips", type=Path, metavar="FILE", help="LPIPS weights of VGG-16, .safetensors")
     command.add_argument(
-        "--results", type=Path, metavar="DIR", help="also keep every scene's numbers, for sides-beside"
+        "--results", type=Path, metavar="DIR", help="also keep every scene's numbers, for beside"
     )
     command.add_argument("--sheet", type=Path, metavar="IMG", help="also six scenes from aside, as .png")
     _add_judging(command)
-    beside = new_command(
-        actions, "sides-beside", "two results of sides on the same scenes, beside each other"
-    )
-    beside.add_argument("before", type=Path, metavar="BEFORE", help="folder of --results")
-    beside.add_argument("after", type=Path, metavar="AFTER", help="folder of --results")
-    beside.add_argument("-o", "--output", type=Path, metavar="FILE", help="also write the table as .md")
-    beside.add_argument("--sheet", type=Path, metavar="IMG", help="also six scenes of both, as .png")
-    beside.set_defaults(json=False)
 
 
 def _add_sharp(actions) -> None:
@@ -283,19 +276,22 @@ def _add_walk(actions) -> None:
         "--results",
         type=Path,
         metavar="DIR",
-        help="keep every walk there, for walk-beside, and go on from it; one folder for each version",
+        help="keep every walk there, for beside, and go on from it; one folder for each version",
     )
     command.add_argument("--sheet", type=Path, metavar="IMG", help="also kept frames and scenes, as .png")
     command.add_argument(
         "--plot", type=Path, metavar="IMG", help="also time and memory against photos, as .png"
     )
     _add_judging(command)
-    beside = new_command(actions, "walk-beside", "two results of walk on the same walks, beside each other")
-    beside.add_argument("before", type=Path, metavar="BEFORE", help="folder of --results")
-    beside.add_argument("after", type=Path, metavar="AFTER", help="folder of --results")
-    beside.add_argument("-o", "--output", type=Path, metavar="FILE", help="also write the table as .md")
-    beside.add_argument("--sheet", type=Path, metavar="IMG", help="also kept frames of both, as .png")
-    beside.set_defaults(json=False)
+
+
+def _add_beside(actions) -> None:
+    command = new_command(actions, "beside", "two results of walk, or of sides, beside each other")
+    command.add_argument("before", type=Path, metavar="BEFORE", help="folder of --results")
+    command.add_argument("after", type=Path, metavar="AFTER", help="folder of --results")
+    command.add_argument("-o", "--output", type=Path, metavar="FILE", help="also write the table as .md")
+    command.add_argument("--sheet", type=Path, metavar="IMG", help="also pictures of both, as .png")
+    command.set_defaults(json=False)
 
 
 def _add_real(actions) -> None:
