@@ -8,7 +8,7 @@ import pytest
 import torch
 from torch.nn.functional import interpolate
 
-from app.gl import SplatRenderer
+from app.gl import SplatRenderer, paints
 from app.gl.hardware import CARD, PROCESSOR, hardware_of
 from app.gl.layered import KEPT, MOVING, LayeredLevel, half
 from app.gl.processor.cell_maps import CellMaps
@@ -199,8 +199,8 @@ def test_a_new_phrase_at_rest_draws_no_splat(renderer):
     renderer.relevance()
     renderer.heat_texture(2)
     renderer.label_texture()
-    renderer.atom_texture()
-    renderer.feature_texture()
+    renderer.picture().atoms()
+    renderer.picture().features()
     kinds = ("colour", "weights", "blend", "pack")
     assert [renderer.passes[kind] for kind in kinds[:3]] == [passes[kind] for kind in kinds[:3]]
 
@@ -591,8 +591,8 @@ def test_a_photo_sees_its_own_layer(gl):
     renderer = SplatRenderer(gl, "float32")
     renderer.set_scene(scene)
     renderer.draw(between(3))
-    renderer.coverage_texture()
-    renderer.agreement_texture()
+    paints.trust(renderer, False)
+    paints.trust(renderer, True)
     live = renderer._scene
     assert live is not None
     photos = live.photo_depths(False)
