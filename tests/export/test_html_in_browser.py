@@ -339,8 +339,10 @@ def test_the_demo_room(page, tmp_path):
     assert path.stat().st_size < 20 * len(trained.gaussians)
     page.open(path, trained.view_size)
     assert page.value(_READY) < 60_000  # milliseconds to the first picture, drawn in software
-    for phrase in ("plant", "piano"):
-        check_answer(page, lf.query(trained, phrase, view=0), 0)
+    until(page, "document.querySelectorAll('[data-state=pending]').length === 0")
+    states = page.value("[...document.querySelectorAll('.chip')].map((chip) => chip.dataset.state)")
+    assert states == ["found", "missing"]
+    check_answer(page, lf.query(trained, "plant", view=0), 0)
     assert page.errors == []
 
 
