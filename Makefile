@@ -1,11 +1,12 @@
 # make run    set up what is missing, then open the window on the demo photos
-# make test   set up what is missing, then every check and every test
+# make test   set up what is missing, then every check and every test of the product
+# make test-lab   the tests of what makes and judges the weights (tests/lab)
 # make lint   the checks alone, without a test
 # make setup  the set-up alone
 # make portable        a folder that runs without Python, in dist/ (Linux)
 # make test-all        every test with every optional package: Ray, SAM 2, TensorBoard, COLMAP, others' measures
 # make torture         what it is to survive (PARTS="calls kills", SEED=1; tests/torture/README.md)
-# make test-machines   every test four times, as four other processors and orders would run it
+# make test-machines   every test, the lab's too, four times, as four other processors and orders would run it
 #
 # Set-up is a virtual environment in .venv, this package in it, and (Debian, Ubuntu) the system's
 # OpenGL libraries where they are missing. Finished steps leave a stamp in .venv and are not
@@ -36,9 +37,9 @@ APT := install() { \
 	echo "Installing $$*"; \
 	$$add "$$@" >/dev/null 2>&1 || { $$get update >/dev/null && $$add "$$@" >/dev/null; }; }
 
-.PHONY: help setup run lint test test-all test-machines torture portable
+.PHONY: help setup run lint test test-lab test-all test-machines torture portable
 help:
-	@sed -n '1,8s/^# //p' Makefile
+	@sed -n '1,9s/^# //p' Makefile
 
 setup: $(STAMP)-dev $(STAMP)-gl $(STAMP)-window $(STAMP)-browser
 
@@ -63,9 +64,13 @@ lint: $(STAMP)-dev
 	else echo "The JavaScript of web pages is not checked: no Biome for this machine."; fi
 
 # No more at a time than cores: three on two were quicker by two minutes, and bounds of time were missed.
-PYTEST := $(BIN)/python -m pytest --numprocesses 2 --dist loadfile --no-loadscope-reorder
+# At its end it says what took longest, five seconds and more.
+PYTEST := $(BIN)/python -m pytest --numprocesses 2 --dist loadfile --no-loadscope-reorder --durations=50 --durations-min=5
 test: setup
-	@$(call CHECKED,$(PYTEST))
+	@$(call CHECKED,$(PYTEST) --ignore tests/lab)
+
+test-lab: setup
+	$(PYTEST) tests/lab
 
 # The checks take the processor time that tests leave (they wait for windows, disks and each other): that
 # is enough for them, and nobody waits for a type checker. What fails in either fails the whole.

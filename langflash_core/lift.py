@@ -25,6 +25,7 @@ from langflash_core.base.records import Shift
 from langflash_core.errors import Cancelled, InputError
 from langflash_core.export.cameras import read_posed
 from langflash_core.geometry.cameras import invert_rigid
+from langflash_core.geometry.nearness import Nearness
 from langflash_core.geometry.turning import axes_matrix
 from langflash_core.images.pictures import fitting_size
 from langflash_core.images.views import load_views
@@ -35,7 +36,7 @@ from langflash_core.scene.lookouts import lookouts
 from langflash_core.scene.weights import sparse_weights
 from langflash_core.splat import render as render_reference
 from langflash_core.splat.backprojection import gathered
-from langflash_core.splat.compose import Nearness, shares
+from langflash_core.splat.compose import shares
 from langflash_core.types import Camera, Frame, Scene, Semantics, Views
 
 PRESET = "mini"

@@ -4,15 +4,19 @@ scene, as the first photo sees them.
 
 from collections.abc import Sequence
 
+import numpy as np
 import torch
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 from torch import Tensor
 
+from langflash_core.errors import PromptError
 from langflash_core.geometry.harmonics import SH_C0
 from langflash_core.language.gaussians import gaussian_relevance
 from langflash_core.language.looks import lab, room_white
 from langflash_core.language.narrowing import Sight, choose, likely, viewer_axes
 from langflash_core.language.relevance import CompiledQuery
+from langflash_core.language.spaces import language_space
+from langflash_core.language.spoken import compile_spoken
 from langflash_core.scene.instances import parts_of
 from langflash_core.scene.thin import covered_areas
 from langflash_core.scene.world import upward
@@ -48,6 +52,39 @@ def meant_relevance(
             relevance[row] *= kept
             told[row] = "; ".join(filter(None, (told[row], choice.note)))
     return relevance, tuple(told)
+
+
+def answering(scene: Scene, phrases: Sequence[str], threshold: float | None = None) -> Bool[np.ndarray, " N"]:
+    """Gaussians that answer at least one of some phrases, whatever the view.
+
+    Args:
+        threshold: relevancy in [0, 1]; None: the scene's calibration.
+
+    Raises:
+        PromptError: none does, or a phrase or the threshold cannot be used. WeightsError: the space has no
+        text weights.
+    """
+    compiled = compile_spoken(scene, language_space(scene.semantics.space), list(phrases))
+    limit = compiled.threshold if threshold is None else threshold
+    check_threshold(limit)
+    best = meant_relevance(scene, compiled, [limit] * len(phrases))[0].amax(0)
+    found = (best >= limit).cpu().numpy() & (scene.semantics.num_atoms > 0)
+    if not found.any():
+        highest = float(best.max()) if len(best) else 0.0
+        raise PromptError(
+            f"nothing in the scene answers {', '.join(phrases)} (best score {highest:.3f}, "
+            f"threshold {limit:.3f}); ask another phrase, or lower the threshold"
+        )
+    return found
+
+
+def check_threshold(threshold: float) -> None:
+    """
+    Raises:
+        PromptError: it is no relevancy.
+    """
+    if not 0 <= threshold <= 1:
+        raise PromptError(f"the threshold {threshold} is out of range; relevancy needs 0 to 1")
 
 
 def _sight(scene: Scene) -> Sight:

@@ -13,7 +13,7 @@ from torch import Tensor
 from langflash_core.base.detail import DEFAULT_DETAIL
 from langflash_core.base.resources import asset_path
 from langflash_core.base.running import Progress, Run
-from langflash_core.errors import InputError, PromptError, ViewError
+from langflash_core.errors import InputError, ViewError
 from langflash_core.export import opened
 from langflash_core.images.decode import grey_photo
 from langflash_core.images.lens import Intrinsics
@@ -55,7 +55,6 @@ def reconstruct(
     grouping: str | None = None,
     detail: str | None = DEFAULT_DETAIL,
     gaussians: int | None = None,
-    refine_seconds: float | None = None,
     viewmats: Tensor | None = None,
     keep: Path | str | None = None,
     progress: Progress | None = None,
@@ -84,8 +83,6 @@ def reconstruct(
         detail: how finely surfaces are covered: "low", "normal", "high"; None: one Gaussian a pixel,
             as the network makes them. Points of `full` are no surfaces: they stay as they are.
         gaussians: about so many, instead of as many as the detail has.
-        refine_seconds: so long poses and one surface of Gaussians, without layers, are fitted to the photos
-            afterwards, and kept so if that brings a view closer that was held out; None: not at all.
         viewmats: poses (V, 4, 4) of the photos, world to camera, in any world and unit: they are not
             sought, and the scene is in that world; preset mini. None: the first photo's camera is the world.
         device: "auto" takes CUDA where there is one; "cpu"; "cuda".
@@ -123,7 +120,6 @@ def reconstruct(
         grouping=grouping,
         detail=detail,
         gaussians=gaussians,
-        refine_seconds=refine_seconds,
         viewmats=viewmats,
         keep=None if keep is None else Path(keep),
     )
@@ -193,21 +189,10 @@ def select(
         PromptError: a prompt or the threshold cannot be used, or no Gaussian passes.
         WeightsError: the language space has no text weights.
     """
-    from langflash_core.meant import meant_relevance
+    from langflash_core.meant import answering
 
     scene, prompts = opened(scene), [prompts] if isinstance(prompts, str) else prompts
-    compiled = compile_spoken(scene, language_space(scene.semantics.space), list(prompts))
-    limit = compiled.threshold if threshold is None else threshold
-    _check_threshold(limit)
-    best = meant_relevance(scene, compiled, [limit] * len(prompts))[0].amax(0)  # (N,)
-    passing = best >= limit if scene.semantics.num_atoms else torch.zeros_like(best, dtype=torch.bool)
-    if not bool(passing.any()):
-        asked, highest = ", ".join(prompts), float(best.max()) if len(best) else 0.0
-        raise PromptError(
-            f"nothing in the scene answers {asked} (best score {highest:.3f}, threshold {limit:.3f}); "
-            "lower the threshold"
-        )
-    return scene.rows(passing)
+    return scene.rows(torch.from_numpy(answering(scene, prompts, threshold)))
 
 
 def web_page(
@@ -285,10 +270,11 @@ def _page_phrases(
         PromptError: a text or the threshold cannot be used.
     """
     from langflash_core.export.html import Phrases
+    from langflash_core.meant import check_threshold
 
     compiled = compile_spoken(scene, language_space(scene.semantics.space), list(texts))  # of heads alone
     limit = compiled.threshold if threshold is None else threshold
-    _check_threshold(limit)
+    check_threshold(limit)
     atoms = compiled.factor  # of which D = atoms Q: products with phrases are the same
     return Phrases(
         texts=compiled.texts,
@@ -319,11 +305,6 @@ def _text_model() -> "TextModel":
         tokens=tuple(sorted(ids, key=lambda token: ids[token])),
         licence="\n".join(licence.read_text(encoding="utf-8") for licence in licences),
     )
-
-
-def _check_threshold(threshold: float) -> None:
-    if not 0 <= threshold <= 1:
-        raise PromptError(f"the threshold {threshold} is out of range; relevancy needs 0 to 1")
 
 
 def best_pair(

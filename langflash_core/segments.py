@@ -16,7 +16,6 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from langflash_core.errors import PromptError
 from langflash_core.export import opened
 from langflash_core.geometry.fusion import ColouredView, Surface, fuse
 from langflash_core.geometry.harmonics import SH_C0
@@ -29,7 +28,7 @@ from langflash_core.language.answers import (
 )
 from langflash_core.language.spaces import language_space
 from langflash_core.language.spoken import compile_spoken
-from langflash_core.meant import meant_relevance
+from langflash_core.meant import check_threshold, meant_relevance
 from langflash_core.scene.instances import disc_radii, things
 from langflash_core.scene.thin import covered_areas
 from langflash_core.splat.visibility import seen_shares
@@ -59,8 +58,7 @@ def segment(
     scene, prompts = opened(scene), [prompts] if isinstance(prompts, str) else prompts
     compiled = compile_spoken(scene, language_space(scene.semantics.space), list(prompts))
     limit = compiled.threshold if threshold is None else threshold
-    if not 0 <= limit <= 1:
-        raise PromptError(f"the threshold {limit} is out of range; relevancy needs 0 to 1")
+    check_threshold(limit)
     relevance, _ = meant_relevance(scene, compiled, [limit] * len(prompts))  # (P, N)
     members = ((relevance >= limit) & (scene.semantics.num_atoms > 0)).cpu()
     shares = photo_shares(scene)  # (V, N)

@@ -373,22 +373,3 @@ def test_the_package_is_light_and_its_functions_keep_their_names():
     subprocess.run([sys.executable, "-c", program], check=True, cwd=Path(lf.__file__).parents[1])
     with pytest.raises(AttributeError, match="no attribute 'nothing'"):
         lf.nothing  # noqa: B018 (the access is the test)  # pyright: ignore[reportAttributeAccessIssue]
-
-
-def test_a_refinement_is_kept_only_if_it_helps(weights, photos, scene):
-    refined = lf.reconstruct(photos, weights=weights, size=SMALL, refine_seconds=2)
-    record = refined.record.refinement
-    before, after = record["held_out_psnr_db"]
-    assert record["held_out"] == "books_right.jpg" and record["steps"][0] >= 1
-    assert record["kept"] == (after > before)
-    assert "fitting" in refined.record.cost.timings
-    same = torch.equal(refined.gaussians.opacities, scene.gaussians.opacities)
-    assert same != record["kept"]
-    assert any("came no closer" in note for note in refined.record.warnings) != record["kept"]
-
-
-def test_a_refinement_needs_seconds_and_two_photos(weights, photos):
-    with pytest.raises(InputError, match="out of range"):
-        lf.reconstruct(photos, weights=weights, refine_seconds=0)
-    with pytest.raises(InputError, match="at least two"):
-        lf.reconstruct(photos[:1], weights=weights, refine_seconds=5)

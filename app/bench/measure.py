@@ -16,7 +16,6 @@ import numpy as np
 
 from langflash_core.base.graphics import Programs
 from langflash_core.base.running import Progress
-from langflash_core.language.relevance import CompiledQuery
 from langflash_core.types import Camera, Scene
 
 from ..gl import SplatRenderer
@@ -26,7 +25,6 @@ from ..gl.processor.still import draw_still
 from ..gl.shapes import MakeShapes
 from ..gl.splats import SplatBuffers
 from .cases import Case
-from .channels import Channels, channels_of, draw_channels
 from .errors import Errors, View, errors_of, true_view
 from .modes import DEFAULT, Mode
 from .twins import StaleOrder
@@ -111,10 +109,6 @@ class _Bench:
         self._late: dict[tuple, StaleOrder] = {}
         self._scenes: dict[tuple, Scene] = {_scene_key(mode): mode.scene(case.scene) for mode in modes}
 
-        self._channels: dict[int | None, Channels] = {
-            mode.channels: channels_of(case.scene, mode.channels) for mode in modes if mode.splatted
-        }
-
     def camera(self, mode: Mode, frame: int) -> Camera:
         """Frame -1 is where frame 0 comes from."""
         camera = self.case.path.cameras[frame + 1]
@@ -140,21 +134,15 @@ class _Bench:
     def draw(self, renderer: SplatRenderer, mode: Mode, camera: Camera) -> None:
         """One picture, its weight maps too unless the mode has none."""
         if mode.still:
-            threads, scene = os.cpu_count() or 1, self._scenes[_scene_key(mode)]
-            if mode.splatted:
-                renderer.bring(draw_channels(scene, self._channels[mode.channels], camera, threads))
-            else:
-                renderer.bring(draw_still(scene, camera, threads=threads))
+            scene = self._scenes[_scene_key(mode)]
+            renderer.bring(draw_still(scene, camera, threads=os.cpu_count() or 1))
         else:
             renderer.draw(camera, fast=mode.fast)
 
     def ask(self, renderer: SplatRenderer, mode: Mode, other: bool = False) -> None:
         """The case's phrases; `other`: other numbers of equal work."""
-        question = self.question(mode)
+        question = self.case.compiled
         renderer.ask(replace(question, prompts=-question.prompts) if other else question, mode.answers)
-
-    def question(self, mode: Mode) -> CompiledQuery:
-        return self.case.uncompiled if mode.whole else self.case.compiled
 
     def _made(self, mode: Mode, key: tuple) -> SplatRenderer:
         def splats(

@@ -13,7 +13,7 @@ from langflash_core.types import Scene
 
 from ..gl.answers import MakeAnswers, ShaderAnswers
 from ..gl.splats import SplatBuffers
-from .twins import FullAnswers, StaleOrder, ThreeSigma, gram_answers
+from .twins import StaleOrder
 
 
 @dataclass(frozen=True)
@@ -23,9 +23,8 @@ class Mode:
     axis: what is decided. name: how. precision: of the targets. kept: weights per Gaussian, None: all
     that the scene has. share: of the Gaussians, the others widened. fast: relevance from numbers
     splatted beside the colour. shrink: of the picture's sides. splats: what the scene is uploaded to.
-    answers: who answers, None: the renderer's own choice. whole: asked in all C channels of D.
+    answers: who answers, None: the renderer's own choice.
     still: drawn on the processor, as the window does where OpenGL runs there too (app/gl/processor/still.py).
-    splatted: language as channels instead of weights (channels.py), so many `channels`, None: all.
     colours: whether the picture's colours may differ from the default's, not its answers alone.
     """
 
@@ -38,11 +37,8 @@ class Mode:
     shrink: int = 1
     splats: type[SplatBuffers] = SplatBuffers
     answers: MakeAnswers | None = None
-    whole: bool = False
     colours: bool = False
     still: bool = False
-    splatted: bool = False
-    channels: int | None = None
 
     def scene(self, scene: Scene) -> Scene:
         """The scene as this mode draws it: fewer Gaussians, or the largest weights of each, renormalised."""
@@ -66,30 +62,19 @@ MODES = (
     Mode("weights", "m = 2", kept=2),
     Mode("weights", "m = 4", kept=4),
     Mode("weights", "m = 8", kept=8),
-    Mode("cut", "3 sigma cut", splats=ThreeSigma, colours=True),
-    Mode("dictionary", "shader queries", answers=ShaderAnswers),
-    Mode("dictionary", "full D", answers=FullAnswers, whole=True),
-    Mode("dictionary", "Gram matrix", answers=gram_answers),
+    Mode("answers", "shader queries", answers=ShaderAnswers),
     Mode("resolution", "half resolution", shrink=2, colours=True),
     Mode("detail", "quarter of Gaussians", share=0.25, colours=True),
     Mode("rasteriser", "tiles on the processor", still=True, colours=True),
     Mode("rasteriser", "such tiles at half resolution", still=True, shrink=2, colours=True),
-    Mode("language", "all channels splatted", still=True, splatted=True, whole=True, colours=True),
-    Mode(
-        "language", "16 channels, decoded", still=True, splatted=True, channels=16, whole=True, colours=True
-    ),
-    Mode("language", "3 channels, decoded", still=True, splatted=True, channels=3, whole=True, colours=True),
     Mode("sort", "stale sort", splats=StaleOrder, colours=True),
 )
 AXES = tuple(dict.fromkeys(mode.axis for mode in MODES[1:]))
 
 
 def modes_for(ctx: moderngl.Context, scene: Scene, axes: Collection[str] = AXES) -> tuple[Mode, ...]:
-    """The default first, then the modes of these axes that differ from it here and on this scene.
-
-    Full D and the Gram matrix are shaders: where the renderer asks on the processor, the shaders of
-    the reduced D stand beside them.
-    """
+    """The default first, then the modes of these axes that differ from it here and on this scene: shaders
+    answer beside it where the renderer asks on the processor."""
     stored = scene.semantics.weight_ids.shape[1]
     same = () if draws_in_software(ctx) else (ShaderAnswers,)
     return DEFAULT, *(

@@ -1,7 +1,6 @@
 """Relevance of phrases, computed from weight maps without touching a splat.
 
-Whoever answers is a class or function of the form `MakeAnswers`: shaders here, numpy in host.py, the ways
-that the bench compares in app/bench/twins.py.
+Whoever answers is a class or function of the form `MakeAnswers`: shaders here, numpy in host.py.
 """
 
 from collections.abc import Callable, Hashable
@@ -62,13 +61,12 @@ class Answers:
 
 
 MakeAnswers = Callable[[Painter, tuple[int, int], PackedMaps], Answers]
-AddSquares = Callable[[PackedMaps, Maps, np.ndarray, moderngl.Framebuffer], None]
 
 
-def add_squares(packed: PackedMaps, maps: Maps, factor: np.ndarray, into: moderngl.Framebuffer) -> None:
+def _add_squares(packed: PackedMaps, maps: Maps, factor: np.ndarray, into: moderngl.Framebuffer) -> None:
     """|w R|^2 and the peak, added to `into`. R = L Q with triangular L: column j needs no atom before j."""
     triangular = np.asarray(np.linalg.qr(factor.T, mode="r")).T  # (Ka, min(Ka, r))
-    for start, first, block in blocks(triangular, triangular=True):
+    for start, first, block in blocks(triangular):
         first_pass = {"with_peak": float(start == 0)}
         packed.combine(into, "norm.frag", maps, block, first, uniforms=first_pass, blend=ADDED)
 
@@ -77,15 +75,8 @@ class ShaderAnswers(Answers):
     """In shaders, from packed maps: the packing is of a view, |F|^2 of a dictionary, its inverse root and the
     best negative's cosine of a set of negatives, relevance of the prompts. Only what changed is drawn."""
 
-    def __init__(
-        self,
-        painter: Painter,
-        size: tuple[int, int],
-        packed: PackedMaps,
-        add_squares: AddSquares = add_squares,
-    ):
+    def __init__(self, painter: Painter, size: tuple[int, int], packed: PackedMaps):
         super().__init__(painter, size, packed)
-        self._add_squares = add_squares
         self._squares = painter.ctx.texture(size, 2, dtype="f4")
         self._scales = painter.ctx.texture(size, 2, dtype="f4")
         self._squares_target = painter.ctx.framebuffer([self._squares])
@@ -97,7 +88,7 @@ class ShaderAnswers(Answers):
         dictionary = (maps.version, factor.tobytes())
         if self.stale("norm", dictionary):
             self._squares_target.clear()
-            self._add_squares(self.packed, maps, factor, self._squares_target)
+            _add_squares(self.packed, maps, factor, self._squares_target)
             self.painter.passes["norm"] += 1
         if self.stale("scales", dictionary, negatives.tobytes()):
             self._scale(maps, factor @ negatives.T)

@@ -6,7 +6,8 @@ from collections.abc import Sequence
 import moderngl
 import numpy as np
 
-from langflash_core.splat.compose import DEPTH, NEAREST
+from langflash_core.geometry.nearness import NEAREST
+from langflash_core.splat.compose import DEPTH
 from langflash_core.splat.projection import ALPHA_MIN
 
 from .colour import draw_colour

@@ -6,8 +6,8 @@ from dataclasses import replace
 import numpy as np
 import torch
 
+from langflash_core.geometry.nearness import NEAREST, Chosen, Nearness
 from langflash_core.scene.changes import Change
-from langflash_core.splat.compose import NEAREST, Chosen, Nearness
 from langflash_core.types import Camera, Scene
 
 from .level import Level, new_name

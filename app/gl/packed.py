@@ -33,11 +33,9 @@ def layer_capacity(num_atoms: int) -> int:
     return next(size for size in _CAPACITIES if num_atoms <= ATOMS_A_TEXEL * size)
 
 
-def blocks(columns: np.ndarray, triangular: bool = False) -> Iterator[tuple[int, int, np.ndarray]]:
+def blocks(columns: np.ndarray) -> Iterator[tuple[int, int, np.ndarray]]:
     """Columns (Ka, n) in blocks that one pass of `PackedMaps.combine` takes, the last filled up with zeros.
-
-    Args:
-        triangular: column j is 0 before atom j, so its pass need not read the texels of those.
+    Column j is 0 before atom j, so its pass need not read the texels of those.
 
     Yields:
         Number of the block's first column; its first atom; the block (Ka - first atom, width), its width
@@ -46,7 +44,7 @@ def blocks(columns: np.ndarray, triangular: bool = False) -> Iterator[tuple[int,
     together = _UNIFORMS // (_HALVES * layer_capacity(len(columns)))
     width = min(_MAX_COLUMNS, 1 << (together.bit_length() - 1))
     for start in range(0, columns.shape[1], width):
-        first = start - start % ATOMS_A_TEXEL if triangular else 0
+        first = start - start % ATOMS_A_TEXEL
         block = columns[first:, start : start + width]
         yield start, first, np.pad(block, ((0, 0), (0, width - block.shape[1])))
 

@@ -4,8 +4,8 @@ from itertools import count
 
 import numpy as np
 
+from langflash_core.geometry.nearness import NEAREST
 from langflash_core.language.relevance import CompiledQuery
-from langflash_core.splat.compose import NEAREST
 
 from .answers import MakeAnswers
 from .fast import MAX_PHRASES, splat_numbers

@@ -29,12 +29,11 @@ from langflash_core.types import Camera, Frame, Scene
 from .answers import MakeAnswers
 from .canvas import Canvas, Precision
 from .colours import hues
-from .display import MASK_STYLES, Answer, Background, Drawn
+from .display import Answer, Background, Drawn
 from .hardware import Hardware
 from .layered import LayeredLevel
 from .layout import PHRASES_A_LAYER
 from .level import Level
-from .painter import Uniforms
 from .picture import DrawnPicture, Picture
 from .processor.still import Still
 from .processor.still_picture import StillPicture
@@ -47,7 +46,9 @@ from .view import ViewTargets
 _names = count(1)
 
 
-class _Answered(NamedTuple):
+class Answered(NamedTuple):
+    """A picture, the answer over it, and the threshold that the question brings along."""
+
     picture: Picture
     answer: Answer
     threshold: float
@@ -297,14 +298,14 @@ class SplatRenderer:
 
     def frame(self, weight_maps: bool = False) -> Frame:
         """The view as tensors on the CPU, float32; weight maps (H, W, K) on request."""
-        return self._drawn().frame(weight_maps)
+        return self.picture().frame(weight_maps)
 
     def pixel(self, x: int, y: int) -> tuple[float, float, np.ndarray | None]:
         """Alpha, depth (scene units, 0 where empty) and weights (K,) of one pixel of the view.
 
         The weights are None until the weight maps of this view are drawn. Reads a few texels.
         """
-        return self._drawn().pixel(x, y)
+        return self.picture().pixel(x, y)
 
     def relevance(self) -> Tensor:
         """Relevance (P, H, W) float32 of the phrases asked, 0 where the view is empty.
@@ -349,22 +350,39 @@ class SplatRenderer:
     def labels(self, threshold: float | None = None) -> Tensor:
         """The best prompt per pixel (H, W) int64, -1 for none."""
         self.label_texture(threshold=threshold)
-        ids = self._drawn().view.display.label_ids
+        ids = self.picture().view.display.label_ids
         width, height = ids.size
         return torch.from_numpy(read(ids).reshape(height, width).round().astype(np.int64) - 1)
 
     # --- pictures -----------------------------------------------------------------------------
 
+    def picture(self) -> Picture:
+        """The picture asked for last; drawn again where another renderer of this canvas drew since."""
+        picture = self._picture
+        if picture is None or not self._canvas.holds(picture.view):
+            raise ValueError("renderer: expected draw(...) before, received no view")
+        picture.lay()
+        return picture
+
+    def answered(self) -> Answered:
+        """The picture asked for last and the answer over it, narrowed where that was told."""
+        asked = self._asked()
+        if self._narrowed is None or self._narrowed[0] != asked.answer.key:
+            return asked
+        key, relevance, name = self._narrowed
+        layers = asked.picture.view.narrowed(name, relevance)
+        return asked._replace(answer=Answer(layers, asked.answer.num_phrases, (*key, name)))
+
     @property
     def rgb_texture(self) -> moderngl.Texture:
         """The view's colours, RGBA8, opaque."""
-        picture = self._drawn()
+        picture = self.picture()
         return picture.view.display.rgb(picture.drawn)
 
     def faded_texture(self) -> moderngl.Texture:
         """`rgb_texture` that fades where no photo looked from about there; the same where nobody knows of
         the photos, and from their own places."""
-        picture = self._drawn()
+        picture = self.picture()
         scene = picture.scene.scene
         display = picture.view.display
         return display.rgb(picture.drawn) if scene.view_ids is None else display.faded(picture.drawn, scene)
@@ -389,7 +407,7 @@ class SplatRenderer:
         Raises:
             ValueError: nothing was asked or drawn, no such prompt or colour map.
         """
-        picture, answer, usual = self._answered()
+        picture, answer, usual = self.answered()
         if not 0 <= prompt < answer.num_phrases:
             raise ValueError(f"prompt: expected 0 to {answer.num_phrases - 1}, received {prompt}")
         limit = usual if threshold is None else threshold
@@ -404,7 +422,7 @@ class SplatRenderer:
         Args:
             colours: (P, 3) in [0, 1]; None: hues spread by the golden ratio.
         """
-        picture, answer, usual = self._answered()
+        picture, answer, usual = self.answered()
         count = answer.num_phrases
         chosen = hues(count) if colours is None else np.asarray(colours, np.float32)
         if chosen.shape != (count, 3):
@@ -412,85 +430,9 @@ class SplatRenderer:
         limit = usual if threshold is None else threshold
         return picture.view.display.labels(picture.drawn, answer, chosen, limit)
 
-    def mask_texture(self, style: str, colours: np.ndarray, thresholds: np.ndarray) -> moderngl.Texture:
-        """What passes its own prompt's threshold.
-
-        Args:
-            style: "flat" in the prompt's colour, "isolate" alone, "hide" left out, "dim" the rest dimmed.
-            colours: (P, 3) in [0, 1]. thresholds: (P,).
-        """
-        picture, answer, _ = self._answered()
-        expected = ((answer.num_phrases, 3), (answer.num_phrases,))
-        if (colours.shape, thresholds.shape) != expected or style not in MASK_STYLES:
-            raise ValueError(f"masks: expected {expected} and one of {MASK_STYLES}, received {style!r}")
-        return picture.view.display.masks(picture.drawn, answer, style, colours, thresholds)
-
-    def margin_texture(
-        self,
-        threshold: float,
-        span: tuple[float, float],
-        colormap: str = COLOUR_MAPS[0],
-        over_rgb: bool = True,
-    ) -> moderngl.Texture:
-        """The best prompt's relevance less the second best's; of one prompt, less `threshold`."""
-        picture, answer, _ = self._answered()
-        return picture.view.display.margin(picture.drawn, answer, threshold, span, colormap, over_rgb)
-
-    def atom_texture(self) -> moderngl.Texture:
-        """Every atom in its own colour (principal axes of the dictionary), on black."""
-        return self._drawn().atoms()
-
-    def weight_texture(self, atom: int, colormap: str = COLOUR_MAPS[0]) -> moderngl.Texture:
-        """One atom's weight map, 0 to 1.
-
-        Raises:
-            ValueError: there is no such atom.
-        """
-        picture = self._drawn()
-        if not 0 <= atom < picture.scene.num_atoms:
-            raise ValueError(f"atom: expected 0 to {picture.scene.num_atoms - 1}, received {atom}")
-        return picture.weight(atom, colormap)
-
-    def feature_texture(self) -> moderngl.Texture:
-        """Principal axes of F(p) = W D as colours, the same in every view; empty pixels black."""
-        return self._drawn().features()
-
-    def depth_texture(self, colormap: str = COLOUR_MAPS[0]) -> moderngl.Texture:
-        """Depth as a colour, near to far over the middle 96 % of the Gaussians in view."""
-        picture = self._drawn()
-        near, far = picture.depth_range
-        span = (float(near), float(max(far, near * 1.001)))
-        return picture.view.display.depth(picture.drawn, span, colormap)
-
-    def shown(self, kind: str, fragment: str, uniforms: Uniforms, key: tuple = ()) -> moderngl.Texture:
-        """What a fragment shader of shaders/splat/ makes of the view's depth, transmittance and camera.
-
-        Args:
-            kind: names the picture. key: of all that `uniforms` hold; another one, and it is painted again.
-        """
-        picture = self._drawn()
-        return picture.view.display.shown(picture.drawn, kind, fragment, uniforms, key)
-
-    def coverage_texture(self) -> moderngl.Texture:
-        """How many photos saw what each pixel shows, in `COUNT_COLOURS`; the first call draws their views."""
-        return self._trust_texture(False, COLOUR_MAPS[0])
-
-    def agreement_texture(self, colormap: str = COLOUR_MAPS[0]) -> moderngl.Texture:
-        """How well the photos' own depths agree at each pixel; grey where fewer than two can tell.
-
-        Raises:
-            ValueError: the scene does not say which photo made which Gaussian.
-        """
-        return self._trust_texture(True, colormap)
-
-    def _trust_texture(self, own: bool, colormap: str) -> moderngl.Texture:
-        picture = self._drawn()
-        photos = picture.scene.photo_depths(own)
-        return picture.view.display.trust(picture.drawn, photos, own, colormap)
-
     @property
     def depth_range(self) -> tuple[float, float]:
-        """Depths of the first and the last colour of `depth_texture`, scene units."""
+        """Depths of the first and the last colour of a picture of depths, scene units."""
         if self._picture is not None:
             return self._picture.depth_range
         return (NEAR, 1.0)
@@ -518,29 +460,12 @@ class SplatRenderer:
         """Whether a moving picture has fewer and smaller layers than one at rest."""
         return moving and not self._canvas.hardware.blends_all
 
-    def _drawn(self) -> Picture:
-        """The picture asked for last; drawn again where another renderer of this canvas drew since."""
-        picture = self._picture
-        if picture is None or not self._canvas.holds(picture.view):
-            raise ValueError("renderer: expected draw(...) before, received no view")
-        picture.lay()
-        return picture
-
-    def _answered(self) -> "_Answered":
-        """As `_asked`, narrowed where that was told."""
-        asked = self._asked()
-        if self._narrowed is None or self._narrowed[0] != asked.answer.key:
-            return asked
-        key, relevance, name = self._narrowed
-        layers = asked.picture.view.narrowed(name, relevance)
-        return asked._replace(answer=Answer(layers, asked.answer.num_phrases, (*key, name)))
-
-    def _asked(self) -> "_Answered":
-        """The picture, the answer over it, and the threshold that the question brings along."""
-        picture, question = self._drawn(), self._question
+    def _asked(self) -> Answered:
+        """As `answered`, whatever was narrowed."""
+        picture, question = self.picture(), self._question
         if question is None:
             raise ValueError("relevance: expected ask(...) before, received no query")
-        return _Answered(picture, picture.answer(question), question.compiled.threshold)
+        return Answered(picture, picture.answer(question), question.compiled.threshold)
 
     # --- the end ------------------------------------------------------------------------------
 

@@ -9,10 +9,10 @@ import numpy as np
 
 from langflash_core.base.graphics import Programs
 from langflash_core.export.colours import atom_colours
+from langflash_core.geometry.nearness import Nearness
 from langflash_core.scene.changed import changed
 from langflash_core.scene.changes import Change
 from langflash_core.scene.thin import thin_with_rows
-from langflash_core.splat.compose import Nearness
 from langflash_core.types import Scene
 
 from .colours import feature_axes

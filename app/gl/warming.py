@@ -8,8 +8,8 @@ import torch
 
 from langflash_core.base.records import Record
 from langflash_core.geometry.harmonics import colour_to_sh
+from langflash_core.geometry.nearness import NEAREST
 from langflash_core.language.relevance import CompiledQuery
-from langflash_core.splat.compose import NEAREST
 from langflash_core.types import Camera, Gaussians, Scene, Semantics
 
 from .answers import ShaderAnswers

@@ -168,15 +168,13 @@ class Record:
     warnings: a sentence each. metric_scale: metres per scene unit. network_unit: the network's
     length units per scene unit. shift: what was taken off the positions of a splat file far from 0, to be put
     back where they are written as doubles; None: nothing. counts: Gaussians predicted and left out. pruning:
-    as `prune` left it. layered: every photo has a whole layer of its own (`splat.compose`). refinement: what
-    a fit to the photos brought. detail: what was spent on how fine elements, and what it bought. light:
-    `gains` and `offsets`, a row of red, green and blue for each view, by which
-    `surface.exposure_compensation` brought the photos' colours to one light. lens: `found`, a mapping of
-    `FoundLens` for each lens that the photos told. left_out: `shares`, of each view what was left out since
-    the others do not show it (`surface.transients`), `unplaced`, names of photos that could not be placed,
-    and `films`, each with its name (`film`), how many `frames` were looked at, and what became of those
-    that were not taken, `why` (phrases to counts).
-    foreseen: `covered`,
+    as `prune` left it. layered: every photo has a whole layer of its own (`splat.compose`). detail: what
+    was spent on how fine elements, and what it bought. light: `gains` and `offsets`, a row of red, green
+    and blue for each view, by which `surface.exposure_compensation` brought the photos' colours to one
+    light. lens: `found`, a mapping of `FoundLens` for each lens that the photos told. left_out: `shares`,
+    of each view what was left out since the others do not show it (`surface.transients`), `unplaced`, names
+    of photos that could not be placed, and `films`, each with its name (`film`), how many `frames` were
+    looked at, and what became of those that were not taken, `why` (phrases to counts). foreseen: `covered`,
     `alike` and `nearest`, a number for each view, as `surface.foreseen` has them. world: where
     it stands; None: nobody looked. thing_names: a person's own, by what the inventory calls a thing.
     calibration: what the network's checkpoint says about scores, instead of its language space. atom_names:
@@ -198,7 +196,6 @@ class Record:
     shift: Shift | None = None
     counts: Mapping[str, int] = field(default_factory=dict)
     pruning: Mapping[str, int] = field(default_factory=dict)
-    refinement: Mapping[str, Any] = field(default_factory=dict)
     detail: Mapping[str, Any] = field(default_factory=dict)
     light: Mapping[str, Any] = field(default_factory=dict)
     lens: Mapping[str, Any] = field(default_factory=dict)

@@ -43,24 +43,23 @@ def write_mask(path: Path, mask: Tensor) -> None:
     write_atomically(path, _encoded(Image.fromarray(mask.cpu().numpy().astype(np.uint8) * 255)))
 
 
-def write_grey(path: Path, values: Tensor, low: float, high: float, bits: int = 16) -> None:
-    """A map (H, W) as grey: `low` is black, `high` is white, `bits` 8 or 16; NaN is black.
+def write_grey(path: Path, values: Tensor, low: float, high: float) -> None:
+    """A map (H, W) as 16 bits of grey: `low` is black, `high` is white; NaN is black.
 
     Raises:
-        ValueError: bits is neither 8 nor 16, or low >= high.
+        ValueError: low >= high.
     """
     _check_map("values", values)
-    if bits not in (8, 16) or not low < high:
-        raise ValueError(f"bits, low, high: expected 8 or 16 and low < high, received {bits}, {low}, {high}")
-    top = 2**bits - 1
+    if not low < high:
+        raise ValueError(f"low, high: expected low < high, received {low}, {high}")
     share = torch.nan_to_num((values.detach().cpu().double() - low) / (high - low), nan=0.0).clamp(0, 1)
-    counts = (share * top).round().numpy().astype(np.uint16 if bits == 16 else np.uint8)
+    counts = (share * (2**16 - 1)).round().numpy().astype(np.uint16)
     write_atomically(path, _encoded(Image.fromarray(counts)))
 
 
-def write_relevance(path: Path, relevance: Tensor, mode: str, bits: int = 16) -> None:
+def write_relevance(path: Path, relevance: Tensor, mode: str) -> None:
     """Relevance (H, W) over the whole range of its mode: cosine -1 to 1, relevancy 0 to 1."""
-    write_grey(path, relevance, *RANGES[mode], bits)
+    write_grey(path, relevance, *RANGES[mode])
 
 
 def write_heat(

@@ -10,12 +10,10 @@ import numpy as np
 import torch
 from jaxtyping import Bool, Float
 
-from langflash_core.errors import InputError, PromptError
+from langflash_core.errors import InputError
 from langflash_core.geometry.cameras import invert_rigid
 from langflash_core.geometry.harmonics import SH_C0
-from langflash_core.language.spaces import language_space
-from langflash_core.language.spoken import compile_spoken
-from langflash_core.meant import meant_relevance
+from langflash_core.meant import answering
 from langflash_core.scene.instances import disc_radii
 from langflash_core.scene.joining import appended
 from langflash_core.splat.visibility import seen_shares
@@ -40,39 +38,28 @@ class Cleaned:
     counts: Mapping[str, int]
 
 
-def cleaned(
-    scene: Scene,
-    recipe: Recipe,
-    *,
-    visible: Bool[np.ndarray, " N"] | None = None,
-    within: Bool[np.ndarray, " N"] | None = None,
-) -> Cleaned:
+def cleaned(scene: Scene, recipe: Recipe) -> Cleaned:
     """What of a scene a recipe takes away.
-
-    Args:
-        visible: what takes part; None: all. within: where anything may go, beside the recipe's phrases.
 
     Raises:
         InputError: the scene does not know what a rule asks for. PromptError: no Gaussian answers the
         phrases.
     """
-    visible = np.ones(len(scene.gaussians), bool) if visible is None else visible
-    scope = visible if within is None else visible & within
-    if recipe.within:
-        scope = scope & answering(scene, recipe.within)
+    every = np.ones(len(scene.gaussians), bool)
+    scope = answering(scene, recipe.within) if recipe.within else every
     reasons: dict[str, Bool[np.ndarray, " N"]] = {}
     if recipe.strength:
-        found = kind_strengths(scene, visible, recipe.kinds)
+        found = kind_strengths(scene, every, recipe.kinds)
         reasons = {kind: chosen(least, recipe.strength) for kind, least in found.items()}
     for rule in recipe.rules:
         reasons[_said(rule)] = meeting(scene, rule)
     reasons = {name: rows & scope for name, rows in reasons.items()}
     if recipe.invert:
-        found = np.logical_or.reduce([*reasons.values(), np.zeros(len(visible), bool)])
+        found = np.logical_or.reduce([~every, *reasons.values()])
         reasons = {_ALL: scope & ~found}
     if recipe.crop is not None:
-        reasons["outside the box"] = visible & ~inside(scene, box_of(scene, recipe.crop, visible))
-    return _counted(reasons, len(visible))
+        reasons["outside the box"] = ~inside(scene, box_of(scene, recipe.crop, every))
+    return _counted(reasons, len(every))
 
 
 def taken_out(scene: Scene, rows: Bool[np.ndarray, " N"], fill_with: Render | None = None) -> Scene:
@@ -86,30 +73,6 @@ def taken_out(scene: Scene, rows: Bool[np.ndarray, " N"], fill_with: Render | No
     gone = torch.from_numpy(rows)
     left = scene.rows(~gone).with_record(num_deleted=scene.record.num_deleted + int(rows.sum()))
     return left if fill_with is None or not rows.any() else appended(left, fill(scene, gone, fill_with))
-
-
-def answering(
-    scene: Scene, phrases: tuple[str, ...], threshold: float | None = None
-) -> Bool[np.ndarray, " N"]:
-    """Gaussians that answer one of some phrases.
-
-    Args:
-        threshold: relevancy in [0, 1]; None: the scene's calibration.
-
-    Raises:
-        PromptError: none does, or a phrase cannot be used. WeightsError: the space has no text weights.
-    """
-    compiled = compile_spoken(scene, language_space(scene.semantics.space), list(phrases))
-    limit = compiled.threshold if threshold is None else threshold
-    best = meant_relevance(scene, compiled, [limit] * len(phrases))[0].amax(0)
-    found = (best >= limit).cpu().numpy() & (scene.semantics.num_atoms > 0)
-    if not found.any():
-        highest = float(best.max()) if len(best) else 0.0
-        raise PromptError(
-            f"nothing in the scene answers {', '.join(phrases)} (best score {highest:.3f}, "
-            f"threshold {limit:.3f}); ask another phrase"
-        )
-    return found
 
 
 def box_of(scene: Scene, crop: str | Box, visible: Bool[np.ndarray, " N"]) -> Box:

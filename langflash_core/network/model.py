@@ -2,7 +2,7 @@
 
 import math
 from abc import abstractmethod
-from collections.abc import Callable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass, replace
 
@@ -207,6 +207,7 @@ class LangFlashNet(nn.Module):
             for handle in handles:
                 handle.remove()
 
+    @torch.inference_mode()
     def predict(
         self,
         views: Views,
@@ -232,108 +233,58 @@ class LangFlashNet(nn.Module):
         Raises:
             Cancelled: `cancelled()` became true; asked before every layer and every pair of photos.
         """
-        return self.predict_scenes([views], progress, cancelled, atoms, groups, redrawn, elements, kept)[0]
-
-    @torch.inference_mode()
-    def predict_scenes(
-        self,
-        scenes: Sequence[Views],
-        progress: Progress | None = None,
-        cancelled: Callable[[], bool] | None = None,
-        atoms: Atoms | None = None,
-        groups: Lifted | None = None,
-        redrawn: Redrawn | None = None,
-        elements: bool = True,
-        kept: Kept = not_kept,
-    ) -> list[Prediction]:
-        """Several scenes of equally many photos of one size: the transformers see them as one batch.
-
-        `timings` of each are its share of the whole. Everything else as `predict`.
-
-        Raises:
-            Cancelled: as `predict`. ValueError: the scenes differ in shape.
-        """
-        shapes = {tuple(views.images.shape) for views in scenes}
-        if len(shapes) != 1:
-            raise ValueError(f"scenes: expected one shape of (V, 3, H, W), received {sorted(shapes)}")
         run = Run(self.begins or evenly(self.stages), progress, cancelled, kept=kept)
         with nullcontext() if cancelled is None else self.stopping(run.check):
-            return self._predict(scenes, run, atoms, groups, redrawn, elements)
+            return self._predict(views, run, atoms, groups, redrawn, elements)
 
     def _predict(
         self,
-        scenes: Sequence[Views],
+        views: Views,
         run: Run,
         atoms: Atoms | None,
         groups: Lifted | None,
         redrawn: Redrawn | None,
         elements: bool,
-    ) -> list[Prediction]:
-        """The stages, timed by `run`; B scenes."""
+    ) -> Prediction:
+        """The stages, timed by `run`."""
         device = next(self.parameters()).device
-        images = torch.stack([views.images for views in scenes]).to(device)
-        Ks = torch.stack([views.Ks for views in scenes]).to(device)
+        images, Ks = views.images[None].to(device), views.Ks[None].to(device)
         size = (images.shape[-2], images.shape[-1])
         with run.stage("encoder"):
             tokens = self.encode(images, Ks)
         language = _beside(lambda: self.language(tokens, images), device)
-        each = [(images[b : b + 1], Ks[b : b + 1], tokens.scene(b)) for b in range(len(scenes))]
-        geometries = [
-            self.reconstruct(s, x, K, own, run, elements) for s, (x, K, own) in zip(scenes, each, strict=True)
-        ]
-        bent = next((found.bent for found in geometries if found.bent), ())
-        if bent:
-            return [Prediction.of_bent(bent, self.preset.space, dict(run.timings)) for _ in scenes]
-        scenes = [_through(views, found.Ks) for views, found in zip(scenes, geometries, strict=True)]
+        geometry = self.reconstruct(views, images, Ks, tokens, run, elements)
+        if geometry.bent:
+            return Prediction.of_bent(geometry.bent, self.preset.space, dict(run.timings))
+        views = _through(views, geometry.Ks)
         with run.stage("language features"):
             features = language()
         with run.stage("grouping"):
-            if groups is not None:
-                weights = [groups(found, views) for found, views in zip(geometries, scenes, strict=True)]
-            else:
-                weights = [
-                    self.parts(own, x, size, f[None]) for (x, _, own), f in zip(each, features, strict=True)
-                ]
+            weights = groups(geometry, views) if groups else self.parts(tokens, images, size, features)
             if redrawn is not None:
-                weights = [redrawn(own, views) for own, views in zip(weights, scenes, strict=True)]
+                weights = redrawn(weights, views)
         with run.stage("aggregation"):
-            dictionaries = [
-                self.dictionary(
-                    w,
-                    f[None],
-                    Seen(x[0], own, found.depths, found.viewmats, views.Ks.to(device), views.sources),
-                )
-                if atoms is None
-                else atoms(w, f[None])
-                for w, f, found, views, (x, _, own) in zip(
-                    weights, features, geometries, scenes, each, strict=True
-                )
-            ]
-        timings = {name: seconds / len(scenes) for name, seconds in run.timings.items()}
-        notes = (*self.notes, *_of_another_size(self.trained_side, size))
-        return [
-            Prediction(
-                gaussians=geometry.gaussians,
-                weights=own_weights,
-                dictionary=dictionary,
-                space=self.preset.space,
-                viewmats=geometry.viewmats,
-                depths=geometry.depths,
-                confidences=geometry.confidences,
-                unplaced=geometry.unplaced,
-                warnings=(
-                    *geometry.warnings,
-                    *(_left_out(views.names[v]) for v in geometry.unplaced),
-                    *notes,
-                ),
-                timings=dict(timings),
-                Ks=geometry.Ks,
-                lenses=geometry.lenses,
-            )
-            for views, geometry, own_weights, dictionary in zip(
-                scenes, geometries, weights, dictionaries, strict=True
-            )
-        ]
+            if atoms is None:
+                placed = geometry.depths, geometry.viewmats, views.Ks.to(device)
+                seen = Seen(images[0], tokens, *placed, views.sources)
+                dictionary = self.dictionary(weights, features, seen)
+            else:
+                dictionary = atoms(weights, features)
+        left_out = [_left_out(views.names[view]) for view in geometry.unplaced]
+        return Prediction(
+            gaussians=geometry.gaussians,
+            weights=weights,
+            dictionary=dictionary,
+            space=self.preset.space,
+            viewmats=geometry.viewmats,
+            depths=geometry.depths,
+            confidences=geometry.confidences,
+            unplaced=geometry.unplaced,
+            warnings=(*geometry.warnings, *left_out, *self.notes, *_of_another_size(self.trained_side, size)),
+            timings=dict(run.timings),
+            Ks=geometry.Ks,
+            lenses=geometry.lenses,
+        )
 
 
 def _through(views: Views, Ks: Tensor | None) -> Views:

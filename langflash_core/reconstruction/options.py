@@ -12,8 +12,6 @@ from langflash_core.base.detail import DEFAULT_DETAIL, check_gaussians, chosen_d
 from langflash_core.errors import InputError
 from langflash_core.images.lens import Intrinsics
 
-LONGEST_REFINEMENT = 3600  # seconds
-
 
 @dataclass(frozen=True)
 class Options:
@@ -31,7 +29,6 @@ class Options:
     grouping: str | None = None
     detail: str | None = DEFAULT_DETAIL
     gaussians: int | None = None
-    refine_seconds: float | None = None
     viewmats: Float[Tensor, "V 4 4"] | None = None
     keep: Path | None = None
 
@@ -39,14 +36,12 @@ class Options:
         """The same with the device that there is, once all was checked that can be before a photo is read.
 
         Raises:
-            InputError: the device, the detail, the number of Gaussians or the refinement cannot be had.
+            InputError: the device, the detail or the number of Gaussians cannot be had.
         """
         device = chosen_device(self.device)
         if self.detail is not None:
             chosen_detail(self.detail)
         check_gaussians(self.gaussians)
-        if self.refine_seconds is not None:
-            _check_refinement(self.refine_seconds, len(self.photos))
         return replace(self, device=device)
 
 
@@ -61,12 +56,3 @@ def chosen_device(name: str) -> str:
     if name == "cuda" and not torch.cuda.is_available():
         raise InputError("there is no CUDA device that torch can use; choose --device cpu or auto")
     return ("cuda" if torch.cuda.is_available() else "cpu") if name == "auto" else name
-
-
-def _check_refinement(seconds: float, num_photos: int) -> None:
-    if not 0 < seconds <= LONGEST_REFINEMENT:
-        raise InputError(
-            f"a refinement of {seconds:g} seconds is out of range; choose up to {LONGEST_REFINEMENT}"
-        )
-    if num_photos < 2:
-        raise InputError("a refinement compares photos with each other; give at least two that overlap")

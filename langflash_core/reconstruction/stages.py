@@ -1,4 +1,4 @@
-"""The stages of a reconstruction, in order: photos, weights, network, assembly, refinement, level.
+"""The stages of a reconstruction, in order: photos, weights, network, assembly, level.
 
 photos -> Views -> Tools -> Prediction -> Scene. Each is a function of what those before it gave; `Run` times
 them and tells how far they are.
@@ -7,8 +7,6 @@ them and tells how far they are.
 from dataclasses import asdict, replace
 
 import torch
-from jaxtyping import Float
-from torch import Tensor
 
 from langflash_core.base.detail import DEFAULT_DETAIL
 from langflash_core.base.memory import peak_memory_mb
@@ -20,7 +18,6 @@ from langflash_core.reconstruction.ahead import Ahead, begin
 from langflash_core.reconstruction.finding import predictor
 from langflash_core.reconstruction.networks import Networks
 from langflash_core.reconstruction.options import Options
-from langflash_core.reconstruction.refining import refined
 from langflash_core.reconstruction.tools import Tools, open_tools
 from langflash_core.reconstruction.views import found_views, posed_views, straight_prediction
 from langflash_core.scene.world import in_world
@@ -30,7 +27,7 @@ from langflash_core.surface.prune import prune
 from langflash_core.types import Cost, FoundLens, Prediction, Scene, Views
 
 # Where each begins in the whole, from its measured share of the time on two CPU cores.
-STAGES = {"photos": 0.0, "weights": 0.08, "network": 0.16, "assemble": 0.66, "refine": 0.97, "level": 0.98}
+STAGES = {"photos": 0.0, "weights": 0.08, "network": 0.16, "assemble": 0.66, "level": 0.98}
 _PATIENCE = 0.2  # seconds, until it is told again how far something is
 _AS_IT_IS = "the preset '{}' makes one Gaussian a pixel; the detail that was asked for is left out"
 
@@ -63,9 +60,7 @@ def _begun(options: Options, run: Run) -> Ahead:
 def _made(options: Options, run: Run, networks: Networks, ahead: Ahead) -> Scene:
     views = _photos(options, run, ahead)
     tools = _weights(options, run, networks, ahead, views)
-    scene, images, lenses = _assembled(options, run, ahead, tools, views)
-    if options.refine_seconds is not None:
-        scene = _refined(options, run, scene, images)
+    scene, lenses = _assembled(options, run, ahead, tools, views)
     if lenses:
         scene = scene.with_record(lens={"found": [asdict(lens) for lens in lenses]})
     run.check()
@@ -120,17 +115,16 @@ def _found(options: Options, run: Run, ahead: Ahead, tools: Tools, views: Views)
 
 def _assembled(
     options: Options, run: Run, ahead: Ahead, tools: Tools, views: Views
-) -> tuple[Scene, Float[Tensor, "V 3 H W"], tuple[FoundLens, ...]]:
-    """The scene; the photos with a place in it, in the light that its colours are of; the lenses found."""
+) -> tuple[Scene, tuple[FoundLens, ...]]:
+    """The scene, and the lenses found."""
     prediction, views = _found(options, run, ahead, tools, views)
-    images = views.images[[v for v in range(views.num_views) if v not in prediction.unplaced]]
     lenses = prediction.lenses
     with run.stage("assemble"), torch.no_grad():
         if tools.finer is None:
             if options.gaussians is not None or options.detail not in (None, DEFAULT_DETAIL):
                 note = _AS_IT_IS.format(options.preset)
                 prediction = replace(prediction, warnings=(*prediction.warnings, note))
-            return prune(assemble(prediction, views, preset=options.preset)), images, lenses
+            return prune(assemble(prediction, views, preset=options.preset)), lenses
         told = run.within("assemble")
         covered = covered_scene(
             prediction,
@@ -141,17 +135,7 @@ def _assembled(
             progress=told,
         )
         del prediction  # five megabytes a photo that nobody asks for any more
-        return coloured_scene(covered, told), covered.light.corrected(images), lenses
-
-
-def _refined(options: Options, run: Run, scene: Scene, images: Float[Tensor, "V 3 H W"]) -> Scene:
-    """The scene fitted to its photos, with the seconds of that in its record."""
-    assert options.refine_seconds is not None
-    with run.stage("refine"):
-        told = run.within("refine")
-        scene = refined(scene, images, options.refine_seconds, options.device, told)
-    fitting = {**scene.record.cost.timings, "fitting": run.timings["refine"]}
-    return scene.with_record(cost=Cost(fitting))
+        return coloured_scene(covered, told), lenses
 
 
 def _in_world(options: Options, scene: Scene) -> Scene:

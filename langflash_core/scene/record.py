@@ -14,7 +14,7 @@ _COST = ("timings", "seconds", "peak_memory_mb")
 _VERSION_1 = "gaussians_per_view"  # a tensor since
 _TEXTS = ("photos", "warnings")
 _MAPPINGS = (
-    "counts", "pruning", "refinement", "detail", "light", "lens", "left_out", "foreseen", "calibration",
+    "counts", "pruning", "detail", "light", "lens", "left_out", "foreseen", "calibration",
 )  # fmt: skip
 _PLAIN: dict[str, tuple[type, ...]] = {
     "preset": (str,),

@@ -31,8 +31,8 @@ def describe(scene: "Scene") -> dict:
         core_box {min, max} in scene units (None when empty), metric_scale (metres per unit or None), world
         (None, or as `Record` has it), counts,
         pruning (as `prune` left it, with `psnr_db` and `relevance_error` where they were measured),
-        refinement (None, or kept, held_out and the PSNR before and after), detail (None, or as `Record` has
-        it), light (None, or gains and offsets, a row of red, green and blue per view), lens, left_out and
+        detail (None, or as `Record` has it),
+        light (None, or gains and offsets, a row of red, green and blue per view), lens, left_out and
         foreseen (None, or as `Record` has them),
         tour (None, or the names of stops, how many notes, and the start), timings {stage: seconds, total}
         (None where they are not known, as in files), warnings`.
@@ -236,7 +236,6 @@ def _document(
         "world": None if known.world is None else world_to_json(known.world),
         "counts": dict(known.counts),
         "pruning": dict(known.pruning) or None,
-        "refinement": dict(known.refinement) or None,
         "detail": dict(known.detail) or None,
         "light": dict(known.light) or None,
         "lens": dict(known.lens) or None,

@@ -14,6 +14,7 @@ from typing import TYPE_CHECKING
 import numpy as np
 from jaxtyping import Bool, Float, Integer
 
+from langflash_core.geometry.nearness import Nearness
 from langflash_core.geometry.poses import NEAREST, Pose, intrinsics
 
 if TYPE_CHECKING:
@@ -32,26 +33,7 @@ ASIDE = math.cos(math.radians(60.0))
 """Degrees between camera and photo, at a surface, up to which it counts as seen: there a picture has faded to
 the half (langflash_core/scene/trust.py)."""
 CELLS = (16, 12)  # of a picture, of which it is asked whether they show something
-SHOWN = 4  # layers of a picture: `NEAREST` of langflash_core/splat/compose.py
 _LEVELS = 5  # of cells, each twice as large: the largest is the picture
-
-
-@dataclass(frozen=True)
-class Layers:
-    """Where the photos of a scene of layers stand: views (V,), centres and axes (V, 3), world; distance: that
-    counts as much as a radian, scene units."""
-
-    views: Integer[np.ndarray, " V"]
-    centres: Float[np.ndarray, "V 3"]
-    axes: Float[np.ndarray, "V 3"]
-    distance: float
-
-    def nearest(self, pose: Pose) -> Integer[np.ndarray, " L"]:
-        """Photos whose layers a picture shows, as langflash_core/splat/compose.py chooses them."""
-        ways = np.linalg.norm(self.centres - pose.centre, axis=1) / self.distance
-        chords = np.linalg.norm(self.axes - pose.axes[:, 2], axis=1)
-        far = ways + 2 * np.arcsin(np.minimum(chords / 2, 1))
-        return self.views[np.argsort(far, kind="stable")[:SHOWN]]
 
 
 @dataclass(frozen=True)
@@ -66,7 +48,7 @@ class Surroundings:
     rows: Integer[np.ndarray, " n"]
     views: Integer[np.ndarray, " n"]
     depth: float
-    layers: Layers | None = None
+    layers: Nearness | None = None
 
     def of(self, there: Bool[np.ndarray, " N"]) -> "Surroundings":
         """Those whose Gaussians are there; the depth stays."""
@@ -98,7 +80,7 @@ class Surroundings:
         """Share of the pose's picture, its box, that photos saw from about there, in [0, 1]; of a scene of
         layers those photos alone whose layers it shows."""
         if self.layers is not None:
-            drawn = np.isin(self.views, self.layers.nearest(pose))
+            drawn = np.isin(self.views, self.layers.seen(np.array(pose.centre), pose.axes[:, 2]).views)
             return replace(self._only(drawn), layers=None).known(pose)
         depths, pixels, focal, inside = self._seen(pose)
         places, own = self.places[inside], self.eyes[inside] - self.places[inside]
@@ -156,18 +138,9 @@ def surroundings_of(scene: "Scene") -> Surroundings | None:
     if not any(len(rows) for rows, _, _ in found):
         return None
     rows, sizes, eyes = (np.concatenate(part) for part in zip(*found, strict=True))
-    layers = _layers(scene, views) if scene.layered else None
+    layers = Nearness.of(scene) if scene.layered else None
     depth = float(np.median(np.linalg.norm(means[rows] - eyes, axis=1)))
     return Surroundings(means[rows], eyes, sizes, rows, ids[rows], depth, layers)
-
-
-def _layers(scene: "Scene", views: list[int]) -> Layers:
-    from langflash_core.geometry.cameras import invert_rigid, median_distance  # loads torch
-
-    viewmats = scene.viewmats.detach().cpu().double()
-    centres = invert_rigid(viewmats)[:, :3, 3].numpy()
-    distance = median_distance(scene.gaussians.means, scene.viewmats[0])
-    return Layers(np.array(views), centres[views], viewmats[views, 2, :3].numpy(), distance)
 
 
 def _sampled(

@@ -12,9 +12,9 @@ import numpy as np
 import torch
 from jaxtyping import Bool, Float
 
+from langflash_core.geometry.nearness import Nearness
 from langflash_core.types import Camera, Scene
 
-from .compose import Nearness
 from .projection import NEAR
 
 SIDE = 320

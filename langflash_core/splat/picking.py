@@ -12,9 +12,10 @@ import torch
 from jaxtyping import Bool, Float, Int
 from torch import Tensor
 
+from langflash_core.geometry.nearness import Nearness
 from langflash_core.types import Camera, Gaussians, Scene, Semantics
 
-from .compose import DEPTH, Nearness, shares
+from .compose import DEPTH, shares
 from .contributions import composition, contributions
 from .mixing import mixing
 from .projection import ALPHA_MIN, DILATION, TAN_MARGIN, Footprints, project, view_depths

@@ -12,9 +12,10 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
+from langflash_core.geometry.nearness import Nearness
 from langflash_core.types import Camera, Gaussians, Scene
 
-from .compose import Nearness, shares
+from .compose import shares
 from .mixing import mixing
 from .projection import ALPHA_MIN, project, view_depths
 

@@ -19,10 +19,10 @@ from langflash_core.base.detail import Detail
 from langflash_core.base.running import Progress
 from langflash_core.geometry.cameras import invert_rigid
 from langflash_core.geometry.harmonics import colour_to_sh, sh_to_colour
+from langflash_core.geometry.nearness import Nearness
 from langflash_core.images.views import source_picture, source_size
 from langflash_core.rig.rig import Rig
 from langflash_core.scene.report import left_out_line
-from langflash_core.splat.compose import Nearness
 from langflash_core.surface.assemble import placed_views, rig_of
 from langflash_core.surface.colours import ROUNDS, solved_colours
 from langflash_core.surface.detailed import assemble_detailed, working_photo, working_size

@@ -18,9 +18,10 @@ from torch import Tensor
 from torch.nn import functional as F
 
 from langflash_core.geometry.cameras import invert_rigid
+from langflash_core.geometry.nearness import Chosen, Nearness
 from langflash_core.rig.projected import project_points
 from langflash_core.rig.rig import Rig
-from langflash_core.splat.compose import Chosen, Nearness, shares
+from langflash_core.splat.compose import shares
 from langflash_core.types import Camera
 
 CELL = 3

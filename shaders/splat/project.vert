@@ -19,9 +19,7 @@ vec3 coefficient(int base) {
 #include "harmonics.glsl"
 #include "luma.glsl"
 
-#ifndef CUT  // the bench compares with one for all
 #define CUT sqrt(2.0 * log(max(in_mean.w / ALPHA_MIN, 1.0)))  // where alpha falls below 1/255
-#endif
 #ifdef REACH  // and no further than so many deviations
 #define RADIUS min(REACH, CUT)
 #else

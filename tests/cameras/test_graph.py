@@ -83,9 +83,9 @@ def test_an_edge_knows_what_its_matches_know_and_never_more_than_they_share():
 
 
 def test_errors_do_not_grow_along_the_tree_as_they_did():
-    """Twenty walks of eight: the last view's turn and place, after the tree and after the adjustment."""
+    """Eight walks of eight: the last view's turn and place, after the tree and after the adjustment."""
     errors = []
-    for seed in range(20):
+    for seed in range(8):
         viewmats, _, pairs = _walk(seed, num_views=8, reach=4)
         tree = chained(8, pairs, confirmed(pairs))
         errors.append([_turned(p.viewmats, viewmats)[-1] for p in (tree, adjusted(tree, pairs))])
@@ -137,7 +137,7 @@ def test_the_adjustment_reaches_the_optimum_of_scipy():
         return graph._cost(*graph._moved(start.viewmats, logs, step), pairs, precisions)
 
     own = adjusted(start, pairs)
-    twin = minimize(cost, np.zeros(21), method="BFGS", options={"gtol": 1e-10})
+    twin = minimize(cost, np.zeros(21), method="BFGS", options={"gtol": 1e-6})
     reached = graph._cost(own.viewmats, np.log(own.scales), pairs, precisions)
     # The last step was worth less than a millionth, and a step more a share of that.
     assert reached == pytest.approx(twin.fun, rel=1e-4)

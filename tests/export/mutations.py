@@ -45,7 +45,6 @@ from tests.export.splats import ksplat_bytes, random_gaussians
 EXTREMES = [0, 1, 0xFF, 0x7F, 0xFFFFFFFF, 0x7FFFFFFF, 0x80000000, 1 << 24, 0xFFFF]
 PHOTOS = (".jpg", ".png", ".webp", ".tiff", ".gif", ".bmp", ".ppm", ".avif", ".heic")
 JSONS = ("a.edits", "one.camera.json", "two.keys.json", "transforms.json")
-MOST_MEMORY = 64 * 2**20  # bytes that reading one of these files of some 10 kB may take
 
 
 def whole_files(folder: Path, count: int = 60) -> dict[str, bytes]:

@@ -139,14 +139,10 @@ def opened(page, file):
     assert page.errors == []
 
 
-def test_it_loads_nothing_but_itself(opened, file):
-    assert opened.requests == [file.resolve().as_uri()]
-
-
-@pytest.mark.parametrize("view", [0, 1])
-@pytest.mark.parametrize("phrase", ASKED)
-def test_pixels_and_answers_are_ours(opened, scene, view, phrase):
-    check_answer(opened, lf.query(scene, phrase, view=view), view)
+def test_pixels_and_answers_are_ours(opened, scene, file):
+    for view, phrase in ((0, "armchair"), (1, "armchair"), (1, "wall"), (0, "piano")):
+        check_answer(opened, lf.query(scene, phrase, view=view), view)
+    assert opened.requests == [file.resolve().as_uri()]  # it loads nothing but itself
 
 
 def test_the_canvas_shows_the_photos_view(page, file, scene):
@@ -339,12 +335,14 @@ def test_the_demo_room(page, tmp_path):
     photos = [asset_path(f"photos/living_room_{side}.png") for side in ("left", "right")]
     trained = lf.reconstruct(photos)
     path = tmp_path / "room.html"
-    pipeline.web_page(trained, path, ["plant", "floor", "piano"])
+    pipeline.web_page(trained, path, ["plant", "piano"])
     assert path.stat().st_size < 20 * len(trained.gaussians)
     page.open(path, trained.view_size)
     assert page.value(_READY) < 60_000  # milliseconds to the first picture, drawn in software
-    for phrase in ("plant", "floor", "piano"):
-        check_answer(page, lf.query(trained, phrase, view=0), 0)
+    until(page, "document.querySelectorAll('[data-state=pending]').length === 0")
+    states = page.value("[...document.querySelectorAll('.chip')].map((chip) => chip.dataset.state)")
+    assert states == ["found", "missing"]
+    check_answer(page, lf.query(trained, "plant", view=0), 0)
     assert page.errors == []
 
 
@@ -389,9 +387,7 @@ def test_a_phrase_that_the_vocabulary_lacks_is_answered(page, reading, scene):
     assert page.errors == []
 
 
-@pytest.mark.parametrize(
-    "fragment", ["#view=length", "#view=map&ask=plant", "#view=-1&mode=photo", "#photo=0", "#%"]
-)
+@pytest.mark.parametrize("fragment", ["#view=length", "#view=-1&mode=photo"])
 def test_an_address_that_names_no_view_shows_the_first(page, file, fragment):
     """`views["length"]` is there, and no view: the page stayed empty."""
     page.open(file, (200, 150), fragment)

@@ -16,6 +16,7 @@ from langflash_core import pipeline
 from langflash_core.export.html import write_html
 from langflash_core.export.page_columns import PLACE_STEPS
 from langflash_core.geometry.cameras import project, transform
+from langflash_core.geometry.nearness import FLOOR, NEAREST, Nearness
 from langflash_core.splat import compose
 from langflash_core.types import Scene
 from tests.app.gl.test_gl_layers import layered
@@ -158,7 +159,7 @@ def test_a_page_holds_the_layers_that_lie_all_over_the_walk(tmp_path):
 def test_the_page_blends_by_our_numbers():
     text = "".join((PAGE / f"{name}.js").read_text(encoding="utf-8") for name in ("layers", "blending"))
     said = {name: float(value) for name, value in re.findall(r"const (\w+) = ([\d.e-]+);", text)}
-    ours = {"NEAREST": compose.NEAREST, "FLOOR": compose.FLOOR, "DEPTH": compose.DEPTH, "MOVING": MOVING}
+    ours = {"NEAREST": NEAREST, "FLOOR": FLOOR, "DEPTH": compose.DEPTH, "MOVING": MOVING}
     assert {name: said[name] for name in ours} == ours
     assert f"PLACE_STEPS = {list(PLACE_STEPS)};" in text
 
@@ -173,7 +174,7 @@ def test_layers_that_nobody_owns_are_one_surface(tmp_path):
 
 @pytest.mark.parametrize("most", [1, 2, 5, 99])
 def test_layers_spread_from_the_first(most):
-    near = compose.Nearness.of(layered(6))
+    near = Nearness.of(layered(6))
     kept = near.spread(most)
     assert len(kept) == min(most, 6) and kept[0] == 0 and list(kept) == sorted(set(kept))
     assert most != 2 or kept == (0, 5)

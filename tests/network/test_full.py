@@ -65,20 +65,6 @@ def test_any_number_of_views(tiny, num_views):
     assert tuple(prediction.timings) == tiny.stages
 
 
-def test_scenes_in_a_batch_are_the_scenes_alone(tiny):
-    scenes = [_views(2), replace(_views(2), images=_views(2).images.flip(-1))]
-    both = tiny.predict_scenes(scenes)
-    for views, found in zip(scenes, both, strict=True):
-        alone = tiny.predict(views)
-        # The same sums in another order: float32, and e^|v| on top for the points.
-        torch.testing.assert_close(found.gaussians.means, alone.gaussians.means, rtol=1e-4, atol=1e-4)
-        torch.testing.assert_close(found.weights, alone.weights, rtol=0, atol=1e-4)
-        torch.testing.assert_close(found.dictionary, alone.dictionary, rtol=0, atol=1e-4)
-    assert not torch.allclose(both[0].gaussians.opacities, both[1].gaussians.opacities)
-    with pytest.raises(ValueError, match="one shape"):
-        tiny.predict_scenes([_views(2), _views(3)])
-
-
 @large
 def test_compiled_parts_give_the_same_numbers(tiny):
     """Through dynamo's capture; its code generation is torch's own and needs a compiler."""

@@ -8,17 +8,15 @@ import pytest
 import torch
 
 from langflash_core.geometry import poses
+from langflash_core.geometry.nearness import Nearness
 from langflash_core.geometry.poses import Pose, Vector, from_view
 from langflash_core.scene.surroundings import (
     A_PHOTO,
     MOST,
     QUANTILES,
-    SHOWN,
-    Layers,
     Surroundings,
     surroundings_of,
 )
-from langflash_core.splat.compose import NEAREST, Nearness
 from langflash_core.types import Scene
 from tests.app.window.scenes import room
 
@@ -88,13 +86,10 @@ def test_a_photos_own_picture_is_known_and_what_is_behind_it_is_not(scene: Scene
 def test_of_layers_those_that_a_picture_shows_are_known(wall: Surroundings) -> None:
     """As the renderer chooses them: six photos in a row, of which the left half saw the wall."""
     at = np.stack((np.arange(6.0), np.zeros(6), np.zeros(6)), 1)
-    layers = Layers(np.arange(6), at, np.tile([0.0, 0.0, 1.0], (6, 1)), FAR)
-    nearness = Nearness(at, layers.axes, FAR, tuple(range(6)))
+    layers = Nearness(at, np.tile([0.0, 0.0, 1.0], (6, 1)), FAR, tuple(range(6)))
     left = replace(wall, views=wall.rows % 3, layers=layers)
     for place, known in ((0.0, True), (2.0, True), (5.0, False)):
         pose = Pose(Vector(place, 0.0, 0.0))
-        chosen = nearness.chosen(poses.to_camera(pose, 64, 48), SHOWN).views
-        assert SHOWN == NEAREST and set(layers.nearest(pose).tolist()) >= set(chosen)
         assert (left.known(pose) > replace(left, layers=None).known(pose) / 2) == known
 
 

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 import torch
 
+from langflash_core.geometry.nearness import FLOOR, Nearness
 from langflash_core.splat import compose, reference
 from langflash_core.types import Camera, Frame, Gaussians, Record, Scene, Semantics
 
@@ -129,7 +130,7 @@ def test_weight_maps_are_blended_with_the_same_numbers():
 def test_at_most_four_layers_count_and_a_layer_leaves_with_nothing():
     places = [0.0, 1.0, 2.0, 3.0, 4.0, 5.0]
     scene = layered([(2, 0.5, 0)] * 6, places)
-    near = compose.Nearness.of(scene)
+    near = Nearness.of(scene)
     assert set(near.chosen(camera_at(scene, 0.1)).views) <= {0, 1, 2, 3}
     # as far from 0 as from 4: neither counts, so that they may change places
     assert set(near.chosen(camera_at(scene, 2.0)).views) == {1, 2, 3}
@@ -146,12 +147,12 @@ def test_a_step_of_the_camera_is_a_step_of_the_picture_everywhere():
     steps = [float((a - b).abs().max()) for a, b in itertools.pairwise(rgb)]
     # weights of 1 / f^2 change by 2 / FLOOR of themselves a distance at a photo's place, where they are 1;
     # a step is .05 / 2 of a distance at most, and colours differ by .75
-    assert max(steps) < 0.75 * 2 / compose.FLOOR * 0.05 / 2
+    assert max(steps) < 0.75 * 2 / FLOOR * 0.05 / 2
 
 
 def test_one_photo_is_one_layer_and_turning_round_still_shows_it():
     scene = layered([(2, 0.2, 0)], [0.0])
-    assert compose.Nearness.of(scene).chosen(camera_at(scene, 0.0, math.pi)).views == (0,)
+    assert Nearness.of(scene).chosen(camera_at(scene, 0.0, math.pi)).views == (0,)
 
 
 def test_what_no_photo_made_is_in_every_layer():

@@ -34,7 +34,7 @@ def run(args: Namespace, out: TextIO) -> None:
     import torch
 
     from langflash_core.export.paint import write_picture
-    from langflash_core.mending.cleaning import answering
+    from langflash_core.meant import answering
     from langflash_core.mending.hiding import BLOCKS, Hiding, hide, preview
     from langflash_core.mending.looks import before_and_after
     from langflash_core.mending.recipes import MARGIN

@@ -113,7 +113,6 @@ def _written(args: Namespace, films: Sequence[dict[str, Any]]) -> "Scene":
             grouping=args.grouping,
             detail=args.detail,
             gaussians=args.gaussians,
-            refine_seconds=args.refine,
             keep=args.keep,
             progress=told,
             ahead=ahead,

@@ -16,7 +16,7 @@ from langflash_core.base.limits import TEXT
 from langflash_core.errors import InputError, SceneFileError, ViewError
 from langflash_core.geometry.poses import Vector
 from langflash_core.scene.container import Container
-from langflash_core.scene.tour import Note, Stop, Tour, checked, read_tour, told_tour
+from langflash_core.scene.tour import Note, Stop, Tour, read_tour, told_tour
 from langflash_core.showing.tours import (
     place_of,
     pose_of_camera,
@@ -149,10 +149,7 @@ def _started(args: Namespace, tour: Tour, found: Container) -> Tour:
 
 
 def _imported(args: Namespace, tour: Tour, found: Container) -> Tour:
-    other = _read(args.file)
-    if not args.add:
-        return other
-    return checked(Tour((*tour.stops, *other.stops), (*tour.notes, *other.notes), tour.start or other.start))
+    return _read(args.file)
 
 
 def _read(path: Path) -> Tour:

@@ -77,12 +77,12 @@ def _get(args: Namespace, out: TextIO) -> None:
         return
     if entry is SAM2:
         with ProgressBar() as progress:
-            _say_file(args, out, download(args.url or entry.url, weights_folder() / entry.file, progress))
+            _say_file(args, out, download(entry.url, weights_folder() / entry.file, progress))
         return
     target = weights_folder() / "downloads" / f"{entry.name}-{entry.file}"
     with ProgressBar() as progress:
         if not target.is_file():
-            download(args.url or entry.url, target, progress)
+            download(entry.url, target, progress)
         progress("converting", 1.0)
         _installed(args, out, target, None)
     if not args.keep:

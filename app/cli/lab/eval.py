@@ -19,6 +19,7 @@ from langflash_core.network import load_network
 from ..renderers import open_renderer
 from ..report import ProgressBar, say_warnings, write_json, write_tables
 from .evals.ablations import ablations
+from .evals.beside import beside
 from .evals.labels import labels
 from .evals.level import level
 from .evals.moved import moved
@@ -27,8 +28,7 @@ from .evals.protocol import protocol
 from .evals.real import real
 from .evals.report import report
 from .evals.sharp import sharp
-from .evals.sides import beside, sides
-from .evals.walk import beside as walk_beside
+from .evals.sides import sides
 from .evals.walk import walk
 from .photos import chosen, opened_folder
 from .shared import opened_lpips
@@ -45,6 +45,7 @@ def run(args: Namespace, out: TextIO) -> None:
         readable_file(args.weights, "checkpoint", WeightsError)
     {
         "ablations": ablations,
+        "beside": beside,
         "rooms": _rooms,
         "calibrate": _calibrate,
         "grouping": _grouping,
@@ -60,9 +61,7 @@ def run(args: Namespace, out: TextIO) -> None:
         "report": report,
         "sharp": sharp,
         "sides": sides,
-        "sides-beside": beside,
         "walk": walk,
-        "walk-beside": walk_beside,
     }[args.action](args, out)
 
 

@@ -85,7 +85,6 @@ def _cache(args: Namespace, out: TextIO) -> None:
         _start_of(args, args.preset),
         kind=args.set,
         scenes=args.scenes,
-        first_seed=args.first_seed,
         part=args.part,
         preset=args.preset,
     )
@@ -207,7 +206,6 @@ def _options(args: Namespace, minutes: float) -> LoopOptions:
         device=args.device,
         seed=args.seed,
         max_steps=args.max_steps,
-        resume=not args.restart,
         batches=args.batches,
         precision=args.precision,
         board=args.board,
@@ -253,7 +251,6 @@ def _run(args: Namespace, out: TextIO) -> None:
             scenes=scenes,
             outlined=[open_folder(place) for place in args.outlined],
             sam=args.sam_teacher,
-            sam_side=args.sam_side,
         )
         if leads():
             print(f"{args.output}: trained {', '.join(p.stage.name for p in recipe.plans)}", file=out)

@@ -7,8 +7,7 @@ from .shared import add_json, new_command
 
 # The decisions that `bench` compares: app.bench.modes.AXES, which would bring torch along.
 BENCH_AXES = (
-    "precision", "relevance", "weights", "cut", "dictionary", "resolution", "detail", "rasteriser",
-    "language", "sort",
+    "precision", "relevance", "weights", "answers", "resolution", "detail", "rasteriser", "sort",
 )  # fmt: skip
 
 

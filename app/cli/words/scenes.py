@@ -83,13 +83,6 @@ def add_reconstruct(commands) -> None:
         help="auto: bfloat16 on graphics cards and, for full, on processors with instructions for it "
         "(default: auto)",
     )
-    command.add_argument(
-        "--refine",
-        type=above_zero,
-        metavar="SECONDS",
-        help="then spend SECONDS fitting poses and one surface of Gaussians, without layers, to the photos; "
-        "kept only if a held-out photo improves",
-    )
     lens = command.add_mutually_exclusive_group()
     lens.add_argument("--fov", type=open_fov, metavar="DEG", help="field of view of the photos' longer side")
     lens.add_argument(
@@ -564,7 +557,6 @@ def add_weights(commands) -> None:
         actions, "get", "download a published checkpoint and convert it; continues where it stopped"
     )
     get.add_argument("name", metavar="NAME", help="a name from `langflash weights list`")
-    get.add_argument("--url", metavar="URL", help="download it from there instead")
     get.add_argument("--keep", action="store_true", help="keep the file as it was downloaded")
     add_json(get)
     imported = new_command(actions, "import", "convert a published checkpoint that is already here")

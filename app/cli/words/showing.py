@@ -31,7 +31,6 @@ def add_tour(commands) -> None:
     out.add_argument("-o", "--output", required=True, type=Path, metavar="FILE", help="the .json to write")
     into = _changing(actions, "import", "a tour from JSON, instead of the scene's own")
     into.add_argument("file", type=Path, metavar="FILE", help="a file written by `langflash tour export`")
-    into.add_argument("--add", action="store_true", help="add it after the scene's own stops and notes")
 
 
 def _add_stop(actions) -> None:

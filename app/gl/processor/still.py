@@ -17,8 +17,9 @@ import torch
 from torch import Tensor
 
 from langflash_core.errors import Cancelled
+from langflash_core.geometry.nearness import NEAREST, Nearness
 from langflash_core.language.relevance import EMPTY_NORM, CompiledQuery
-from langflash_core.splat.compose import NEAREST, Nearness, shares
+from langflash_core.splat.compose import shares
 from langflash_core.splat.projection import (
     ALPHA_MIN,
     NEAR,
@@ -162,7 +163,6 @@ def draw_still(
     *,
     marks: tuple[np.ndarray, np.ndarray] | None = None,
     weight_maps: bool = True,
-    carried: Tensor | None = None,
     most: int = NEAREST,
     threads: int = 1,
     stopping: Callable[[], bool] = lambda: False,
@@ -171,7 +171,6 @@ def draw_still(
 
     Args:
         most: layers that are blended, of a scene of layers.
-        carried: (N, F), composited in place of the weights.
         marks: shown (N,) bool and tints (N,) uint8, as `SplatRenderer.mark` takes them.
         threads, stopping: as `rasterize_tiles`.
 
@@ -179,7 +178,7 @@ def draw_still(
         Cancelled: `stopping` said so.
     """
 
-    order = _Order(scene, camera, marks, weight_maps, carried, threads, stopping)
+    order = _Order(scene, camera, marks, weight_maps, threads, stopping)
     chosen = Nearness.of(scene).chosen(camera, most) if scene.layered else None
     kept = order.kept()
     if chosen is None or not chosen.views:
@@ -214,7 +213,6 @@ class _Order:
     camera: Camera
     marks: tuple[np.ndarray, np.ndarray] | None
     weight_maps: bool
-    carried: Tensor | None
     threads: int
     stopping: Callable[[], bool]
 
@@ -238,10 +236,7 @@ class _Order:
         depths = torch.zeros(len(gaussians)).index_copy(0, footprints.ids, footprints.depths.float())
         features = [torch.cat((colours, depths[:, None]), -1)]
         if self.weight_maps:
-            if self.carried is None:
-                features.append(_sparse_in_half(self.scene.semantics.rows(kept)))
-            else:
-                features.append(self.carried.detach()[kept].half())
+            features.append(_sparse_in_half(self.scene.semantics.rows(kept)))
             self._go_on()
         maps, alphas = rasterize_tiles(
             footprints, features, self.camera, threads=self.threads, stopping=self.stopping

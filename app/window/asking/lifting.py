@@ -6,14 +6,13 @@ goes back to it. Heavy imports wait until they are needed.
 """
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
 
 from langflash_core.scene.edits import Marks
 
-from ..commands import Notify
 from ..requests import Asked
 from ..requests import Job as Request
-from ..scene.commands import SceneArrived, room_of
+from ..scene.merging import Remade
 from ..scene.state import Job, Room, SceneInfo
 from ..scene.work import describe_scene
 from ..state import State
@@ -41,29 +40,10 @@ class TeachPhrases:
 
 
 @dataclass(frozen=True)
-class PhrasesTaught:
-    """The scene with number `serial`, as its marks had edited it, with language."""
+class PhrasesTaught(Remade):
+    """With language."""
 
-    serial: int
-    marks: Marks
-    info: SceneInfo
-
-    def fits(self, state: State) -> bool:
-        """Whether nothing has been edited meanwhile."""
-        info = state.scene.info
-        return info is not None and info.serial == self.serial and state.editing.marks == self.marks
-
-    def apply(self, state: State) -> State:
-        if self.fits(state):
-            return state
-        text = "It was not taught, since the scene was edited meanwhile; teach it again."
-        return Notify(text).apply(state.with_scene(job=None))
-
-    def arrival(self, state: State) -> SceneArrived:
-        """What brings it into a state that it fits: the view stays."""
-        return SceneArrived(
-            self.info, room=replace(room_of(state, self.info), history=None, saved=None), replaces=True
-        )
+    REFUSED = "It was not taught, since the scene was edited meanwhile; teach it again."
 
 
 @dataclass(frozen=True)

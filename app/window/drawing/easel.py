@@ -158,15 +158,15 @@ class Easel:
             return
         active = next((i for i, p in enumerate(asked) if p.key == state.asking.active), 0)
         fill, faded = fills_gaps(state), mode is pictures.RGB and keeps_near(state, self.drawn.pose)
-        cuts = tuple((p.colour, p.cut, p.shown_from) for p in asked)
-        wanted = (mode, active, state.asking.atom, faded, fill, cuts, state.heat_colours)
-        if wanted == self._painted:
+        shown_from = asked[active].shown_from if asked else 0.0
+        colours, cuts = tuple(p.colour for p in asked), tuple(p.cut for p in asked)
+        wanted = Wanted(colours, cuts, active, shown_from, state.asking.atom, state.heat_colours)
+        painted = (mode, faded, fill, wanted)
+        if painted == self._painted:
             return
-        self._painted = wanted
+        self._painted = painted
         self.renderer.fill(fill)
-        self.texture = (
-            self.renderer.faded_texture() if faded else self._texture_of(mode, asked, active, state)
-        )
+        self.texture = self.renderer.faded_texture() if faded else PAINTS[mode](self.renderer, wanted)
 
     def _mode(self, state: State, drawn: Drawn, asked: list[Prompt]) -> Picture:
         """That is wanted, or colours where the picture, the question or the scene lack what it needs."""
@@ -175,13 +175,6 @@ class Easel:
         if state.scene.mode.answers and (not asked or len(asked) != len(self.asked.keys)):
             return pictures.RGB
         return state.scene.mode if possible(state.scene.mode, state.scene.info) else pictures.RGB
-
-    def _texture_of(self, mode: Picture, asked: list[Prompt], active: int, state: State) -> moderngl.Texture:
-        """The texture that shows a mode; `asked` in the order of the query, not empty where it `answers`."""
-        shown_from = asked[active].shown_from if asked else 0.0
-        colours, cuts = np.array([p.colour for p in asked]), np.array([p.cut for p in asked])
-        wanted = Wanted(colours, cuts, active, shown_from, state.asking.atom, state.heat_colours)
-        return PAINTS[mode](self.renderer, wanted)
 
     # --- what it says -----------------------------------------------------------------------
 

@@ -10,9 +10,9 @@ from typing import TYPE_CHECKING
 
 import torch
 
+from langflash_core.geometry.nearness import NEAREST
 from langflash_core.geometry.poses import to_camera
 from langflash_core.scene.exposure import lit_camera
-from langflash_core.splat.compose import NEAREST
 
 from ...gl.layered import MOVING
 from ...gl.processor.artist import Artist, Stopping, Work

@@ -9,9 +9,8 @@ from dataclasses import dataclass, field, replace
 from langflash_core.mending.recipes import HOWS, MOST_MARGIN
 from langflash_core.scene.edits import Marks
 
-from ..commands import Notify
-from ..scene.commands import SceneArrived, room_of
-from ..scene.state import Job, Room, SceneInfo
+from ..scene.merging import Remade
+from ..scene.state import Job, Room
 from ..state import State
 from .state import Hiding, Region, Spot
 
@@ -74,29 +73,12 @@ class HideForGood:
 
 
 @dataclass(frozen=True)
-class HiddenForGood:
-    """The scene with number `serial` with what its marks had selected hidden. said: what was done."""
+class HiddenForGood(Remade):
+    """With what its marks had selected hidden. said: what was done."""
 
-    serial: int
-    marks: Marks
-    info: SceneInfo
+    REFUSED = "Nothing was hidden, since the scene was edited in the meantime; hide it again."
+
     said: str
-
-    def fits(self, state: State) -> bool:
-        """Whether nothing has been edited meanwhile."""
-        info = state.scene.info
-        return info is not None and info.serial == self.serial and state.editing.marks == self.marks
-
-    def apply(self, state: State) -> State:
-        if self.fits(state):
-            return state
-        text = "Nothing was hidden, since the scene was edited in the meantime; hide it again."
-        return Notify(text).apply(state.with_scene(job=None))
-
-    def arrival(self, state: State) -> SceneArrived:
-        """What brings it into a state that it fits."""
-        room = replace(room_of(state, self.info), history=None, saved=None, unhidden=None)
-        return SceneArrived(self.info, room=room, replaces=True)
 
 
 @dataclass(frozen=True)

@@ -311,7 +311,8 @@ class ScoreFloaters(EditTask):
 
     def _by_rules(self, shown: "Scene") -> "tuple[Mask | None, Mask | None, Mask | None, Box | None]":
         """What meets a rule, what answers its phrases, what is outside its box, and that."""
-        from langflash_core.mending.cleaning import answering, box_of, inside, measured, meeting
+        from langflash_core.meant import answering
+        from langflash_core.mending.cleaning import box_of, inside, measured, meeting
 
         recipe, about = self.recipe, (self.marks.changes,)
         ruled = spoken = outside = box = None

@@ -19,6 +19,7 @@ from ..opening import commands as opening
 from ..opening.panels import browser, strip
 from ..recovery import panels as recovery_panels
 from ..scene import commands as show
+from ..scene import merging
 from ..scene.drops import There, typed_path, typed_scene
 from ..scene.panels import rooms
 from ..state import State
@@ -54,7 +55,7 @@ _POINTING = 6  # commands of a family whose keys point where they go
 COLUMNS = ((None, "View", "Program"), ("File", "Find", "Tools", "Edit"))  # of help; None: the gestures
 _CLOSING = (
     do.ShowDialog | show.SaveScene | show.OpenPaths | show.Instead | show.All | show.GoOn | show.SaveFirst
-    | show.MergeScene | opening.LookForPlace | opening.PlaceFound | opening.TakeFrames
+    | merging.MergeScene | opening.LookForPlace | opening.PlaceFound | opening.TakeFrames
     | ask.SavePrompts | ask.LoadPrompts | clean.SaveRecipe | clean.LoadRecipe | export.Export
 )  # fmt: skip
 

@@ -8,8 +8,9 @@ from ..dialogs import Dialog
 from ..effects import Effects, Hands
 from ..kit.textures import Thumbnails
 from ..scene import samples
-from ..scene.commands import AddPhotos, Instead, MergeScene, OpenPaths, Reconstruct, SetPhotosAside
+from ..scene.commands import AddPhotos, Instead, OpenPaths, Reconstruct, SetPhotosAside
 from ..scene.drops import typed_path
+from ..scene.merging import MergeScene
 from ..state import State
 from . import native
 from .commands import (

@@ -8,8 +8,7 @@ import numpy as np
 
 from langflash_core.geometry import poses
 from langflash_core.images.still_names import shown_name
-from langflash_core.scene.edits import Marks, delete, deny_atom
-from langflash_core.scene.mask import Mask
+from langflash_core.scene.edits import Marks
 
 from ..commands import NOTHING_TO_SAVE, Command, Notify, ShowDialog
 from ..dialogs import Dialog
@@ -417,95 +416,6 @@ class AskAboutScene:
 
     def apply(self, state: State) -> State:
         return replace(state.with_scene(dropped=(self.path,)), dialog=Dialog.DROP_SCENE)
-
-
-# Two scenes as one
-
-
-@dataclass(frozen=True)
-class MergeScene:
-    """Put what a scene file holds beside what is on show; replaces a job under way."""
-
-    path: Path
-
-    def apply(self, state: State) -> State:
-        if state.scene.info is None:
-            return Notify(NOTHING_TO_MERGE).apply(state)
-        job = Job(f"Merging {self.path.name}", "reading", started=state.now)
-        return replace(state.with_scene(job=job), dialog=None)
-
-
-@dataclass(frozen=True)
-class Merged:
-    """The scene with number `serial`, of which there was so much, and another as one scene; or, where `gone`
-    says what was taken away, what fills its hole, or stands for it but is not what is `denied`; or `copied`,
-    copies of what was selected, or laid over what is `gone`. beyond: how much of `gone` was not selected."""
-
-    serial: int
-    there: tuple[int, int]
-    info: SceneInfo
-    name: str
-    gone: Mask | None = None
-    copied: bool = False
-    denied: str = ""
-    beyond: int = 0
-
-    @property
-    def said(self) -> str:
-        """What people should know of it, or nothing."""
-        if not self.beyond or self.gone is None:
-            return ""
-        own = len(self.gone) - self.beyond
-        return f"{self.beyond:,} Gaussians behind it and along its edge went with the {own:,} selected."
-
-    def fits(self, state: State) -> bool:
-        """Whether it still holds the scene on show."""
-        marks = state.editing.marks
-        return (
-            state.scene.info is not None
-            and state.scene.info.serial == self.serial
-            and (marks is not None and marks.there == self.there)
-        )
-
-    def apply(self, state: State) -> State:
-        if self.fits(state):
-            return state
-        text = f"{self.name} was not merged, since another scene is open now; merge it again."
-        if self.denied:
-            text = "Nothing was removed, since the scene has changed; click it again."
-        elif self.copied:
-            text = "Nothing was copied, since the scene has changed; copy it again."
-        elif self.gone is not None:
-            text = "Nothing was filled, since the scene has changed; fill it again."
-        return Notify(text).apply(state.with_scene(job=None))
-
-    def arrival(self, state: State) -> "SceneArrived":
-        """What brings it into a state that it fits: the merge is one more edit, its things selected."""
-        history, saved = state.editing.history, state.editing.saved
-        assert self.info.history is not None and history is not None
-        whole = self.info.history.marks
-        count = whole.there[0]
-        before = history.of_size(self.there[0], history.marks.atoms[: self.there[1]])
-        before = before.of_size(count, whole.atoms)
-        brought = Mask.full(count) - Mask.first(count, self.there[0])
-        after, label = replace(before.marks, there=whole.there, selected=brought), f"Merge {self.name}"
-        if self.gone is not None:
-            kept = before.marks.selected if self.denied or self.copied else Mask.none(count)
-            after = delete(replace(after, selected=kept), self.gone.of_count(count))
-            label = f"Clone {len(brought):,}" if self.copied else f"Delete and fill {len(self.gone):,}"
-            if self.denied:
-                after = deny_atom(after, whole.there[1] - 1, self.denied)
-                label = f"Remove a part of {self.denied}"
-        elif self.copied:
-            label = f"Copy {len(brought):,}"
-        history = before.edited(label, after)
-        if saved is not None:
-            saved = saved.of_size(self.there[0], saved.atoms[: self.there[1]]).of_size(count, whole.atoms)
-        room = replace(room_of(state, self.info), history=history, saved=saved)
-        return SceneArrived(replace(self.info, history=history), room=room, replaces=True)
-
-
-NOTHING_TO_MERGE = "There is no scene to merge into; open one first."
 
 
 @dataclass(frozen=True)

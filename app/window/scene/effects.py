@@ -31,8 +31,6 @@ from .commands import (
     GoToRoom,
     Instead,
     Loaded,
-    Merged,
-    MergeScene,
     OpenPaths,
     OpenScene,
     PauseJob,
@@ -44,6 +42,7 @@ from .commands import (
     dropped,
 )
 from .drops import sort_drop, told_few
+from .merging import Merged, MergeScene
 from .standing import LevelScene
 from .state import WHOLE, WHOLE_PHOTOS, SceneInfo
 from .unfinished import FEWEST

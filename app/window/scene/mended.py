@@ -18,7 +18,7 @@ from langflash_core.scene.mask import Mask
 from ..editing.mending import HiddenForGood
 from ..editing.state import Region, Spot
 from ..requests import Asked, Job
-from .commands import Merged
+from .merging import Merged
 from .state import SceneInfo
 from .work import describe_scene
 

@@ -93,7 +93,6 @@ _SAID = {
     "elements": "covering surfaces with Gaussians",
     "colours": "matching colours",
     "prune": "tidying up",
-    "refine": "fitting to the photos",
     "level": "finding the floor",
 }
 

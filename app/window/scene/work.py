@@ -27,7 +27,6 @@ from ..requests import Asked, Job, SceneTask, Task
 from . import unfinished
 from .commands import (
     ChoosingFailed,
-    Merged,
     PairChosen,
     PhotoFailed,
     PhotoRead,
@@ -38,6 +37,7 @@ from .commands import (
 )
 from .lenses import told_lenses
 from .memory import SceneMemory
+from .merging import Merged
 from .standing import Levelled
 from .state import ABOVE, WHOLE_PHOTOS, SceneInfo
 

@@ -146,16 +146,15 @@ def room_subjects(
     *,
     kind: str = "held_out",
     count: int = 20,
-    first: int | None = None,
     times: int = MOST_ENLARGED,
 ) -> Iterator[Subject]:
     """Rooms of a set of `lab train cache`, made again from their seeds, `times` as large, with their
     third view as the photo from between.
 
     Args:
-        kind: "held_out" or "validation". first: seed of the first room; None: the set's own.
+        kind: "held_out" or "validation".
     """
-    plan = cache_plan(kind, count, first)
+    plan = cache_plan(kind, count)
     for shard in plan.shards():
         width, height = (side * times for side in shard.size)
         for seed in range(shard.first_seed, shard.first_seed + shard.count):

@@ -100,14 +100,14 @@ def carried(view: DepthView, way: str, degrees: float, up: Float[np.ndarray, " 3
 
 
 def room_cases(
-    pack: Pack, renderer: RoomRenderer, *, kind: str = "held_out", count: int = 100, first: int | None = None
+    pack: Pack, renderer: RoomRenderer, *, kind: str = "held_out", count: int = 100
 ) -> Iterator[Case]:
     """Rooms of a set of `langflash lab train cache`, made again from their seeds: the same photos.
 
     Args:
-        kind: "held_out" or "validation". first: seed of the first room; None: the set's own.
+        kind: "held_out" or "validation".
     """
-    plan = cache_plan(kind, count, first)
+    plan = cache_plan(kind, count)
     for shard in plan.shards():
         width, height = shard.size
         for seed in range(shard.first_seed, shard.first_seed + shard.count):

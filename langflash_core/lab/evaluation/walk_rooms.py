@@ -1,8 +1,7 @@
 """A camera that somebody carries through a rendered room: smooth, free of walls and furniture.
 
-Two ways to walk. "aside": some two metres sideways around what the first photo looks at, looking about, so
-that even the first and the last picture share what they show; "round": most of the way around the middle of
-the room, looking across it, so that eight photos on the way overlap, each with the next.
+It goes some two metres sideways around what the first photo looks at, looking about, so that even the first
+and the last picture share `MIN_OVERLAP` of what they show.
 
 Worlds: the room's (y up), metres; T places on the way; H W pixels.
 """
@@ -25,9 +24,6 @@ from langflash_core.lab.rooms.cameras import (
     stands_free,
 )
 
-WAYS = ("aside", "round")
-SHARING = {"aside": 2, "round": 8}
-"""So many photos, spread over the way, must share `MIN_OVERLAP` of their pictures each with the next."""
 TRIES = 40
 _LOOKED = 33  # places at which the way is proven
 _SMALL = 96  # pixels of the longer side, to prove what cameras see
@@ -42,14 +38,13 @@ class _Lens:
     size: tuple[int, int]  # (height, width)
 
 
-def found_way(staged: StagedRoom, renderer: RoomRenderer, kind: str, seed: int) -> Way | None:
+def found_way(staged: StagedRoom, renderer: RoomRenderer, seed: int) -> Way | None:
     """A way through the room that `renderer` was last given; None where none of `TRIES` is free."""
-    rng = np.random.default_rng([seed, 35, WAYS.index(kind)])
-    draft = {"aside": _aside, "round": _round}[kind]
+    rng = np.random.default_rng([seed, 35, 0])
     lens = _small_lens(staged)
     for attempt in range(TRIES):
-        way = draft(staged, rng, 0.97**attempt)
-        if _free(staged, way) and _shares(renderer, way, lens, SHARING[kind]):
+        way = _aside(staged, rng, 0.97**attempt)
+        if _free(staged, way) and _shares(renderer, way, lens):
             return way
     return None
 
@@ -81,29 +76,6 @@ def _aside(staged: StagedRoom, rng: np.random.Generator, shrunk: float) -> Way:
     return way
 
 
-def _round(staged: StagedRoom, rng: np.random.Generator, shrunk: float) -> Way:
-    """An ellipse around the middle of the room; the eye looks across it."""
-    shell = staged.room.shell
-    middle = np.array([shell.size[0] / 2, 0.0, shell.size[1] / 2])
-    middle += np.array([shell.size[0], 0.0, shell.size[1]]) * rng.uniform(-0.08, 0.08, 3)
-    radii = np.array(shell.size) * rng.uniform(0.12, 0.3, 2) * shrunk
-    begin, turn = float(rng.uniform(0, 2 * math.pi)), math.radians(float(rng.uniform(230, 320)))
-    turn *= float(rng.choice([-1.0, 1.0]))
-    high, phases = float(rng.uniform(1.35, 1.65)), rng.uniform(0, 2 * math.pi, 4)
-    yaw, pitch, roll = (math.radians(d) for d in rng.uniform((4, 2, 0.5), (10, 5, 2.0)))
-
-    def way(share: float) -> np.ndarray:
-        angle = begin + turn * share
-        wave = np.sin(2 * math.pi * share * np.array([2.0, 3.0, 2.5, 3.5]) + phases)
-        out = np.array([math.cos(angle), 0.0, math.sin(angle)])
-        place = middle + out * np.array([radii[0], 0.0, radii[1]]) * (1 + 0.1 * wave[0])
-        place[1] = high + 0.08 * wave[1]
-        target = _turned(-out, yaw * wave[2], pitch * wave[3] - math.radians(12))
-        return look_at(place, place + target, roll * wave[0])
-
-    return way
-
-
 def _turned(direction: np.ndarray, yaw: float, pitch: float) -> np.ndarray:
     """A direction (y up) swung aside and tilted up."""
     flat = math.hypot(direction[0], direction[2])
@@ -126,18 +98,14 @@ def _small_lens(staged: StagedRoom) -> _Lens:
     return _Lens(staged.views.Ks[0].astype(float) * scales[:, None], size)
 
 
-def _shares(renderer: RoomRenderer, way: Way, lens: _Lens, photos: int) -> bool:
-    """Whether no picture is blocked, and each of so many photos shares enough with the next, both ways."""
-    views = np.stack([way(share) for share in np.linspace(0, 1, photos)])
+def _shares(renderer: RoomRenderer, way: Way, lens: _Lens) -> bool:
+    """Whether neither the first picture nor the last is blocked, and each shares enough with the other."""
+    views = np.stack([way(0.0), way(1.0)])
     depths = np.stack([renderer.draw(view, lens.K, lens.size).depth for view in views])
     if any(np.median(d[d > 0]) < MIN_MEDIAN_DEPTH if (d > 0).any() else True for d in depths):
         return False
     Ks = np.repeat(lens.K[None], 2, axis=0)
-    return all(
-        overlap_fraction(depths[list(pair)], views[list(pair)], Ks) >= MIN_OVERLAP
-        for k in range(photos - 1)
-        for pair in ((k, k + 1), (k + 1, k))
-    )
+    return all(overlap_fraction(depths[order], views[order], Ks) >= MIN_OVERLAP for order in ([0, 1], [1, 0]))
 
 
 def shaken(

@@ -41,7 +41,7 @@ class Bench:
     """What scenes are made and judged with.
 
     render: draws one. weights, preset, size: as `reconstruct` has them. assume_lens: it is told nothing of
-    the lens. given_poses: it is told where the photos were taken. alone: kept frames' own two photos stand
+    the lens. alone: kept frames' own two photos stand
     beside. align: also from poses fitted to the pictures. lpips: None leaves it out. memory: each scene is
     made in a process of its own, whose memory is told. colmap: its cameras stand beside. aside: also from
     aside, by photos of the same place.
@@ -52,7 +52,6 @@ class Bench:
     preset: str = "mini"
     size: int | None = None
     assume_lens: bool = False
-    given_poses: bool = False
     alone: bool = True
     align: bool = False
     lpips: Lpips | None = None
@@ -123,7 +122,6 @@ def made_of(walk: Walk, frames: Sequence[int], bench: Bench, *, memory: bool = F
         "weights": bench.weights,
         "intrinsics": None if bench.assume_lens else lenses_of(photos),
         "size": bench.size,
-        "viewmats": torch.from_numpy(truth).float() if bench.given_poses else None,
     }
     with files_of(photos) as paths:
         if memory:

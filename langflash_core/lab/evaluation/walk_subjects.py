@@ -37,7 +37,6 @@ from langflash_core.surface.detailed import MOST_ENLARGED
 
 PHOTOS = (2, 4, 8, 16, 32)
 KEPT = 8
-RULES = ("same", "apart")
 _MOMENTS = 8  # of an exposure that is blurred
 
 
@@ -176,18 +175,16 @@ def room_walks(
     renderer: RoomRenderer,
     plan: Plan,
     *,
-    way: str = "aside",
     camcorder: Camcorder = Camcorder(),
     kind: str = "held_out",
     count: int = 20,
-    first: int | None = None,
 ) -> Iterator[Walk]:
     """Walks through the rooms of `langflash lab eval sides`; those without a free way are passed over.
 
     Args:
-        way: of `walk_rooms.WAYS`. count: of walks. first: seed of the first room; None: the set's own.
+        count: of walks.
     """
-    rooms = cache_plan(kind, 10**6, first)
+    rooms = cache_plan(kind, 10**6)
     found = 0
     for shard in rooms.shards():
         width, height = shard.size
@@ -197,7 +194,7 @@ def room_walks(
             staged = staged_room(
                 seed, pack, renderer, num_views=shard.views, size=(height, width), libraries=rooms.libraries
             )
-            path = found_way(staged, renderer, way, seed)
+            path = found_way(staged, renderer, seed)
             if path is not None:
                 found += 1
                 yield _room_walk(staged, renderer, path, plan, camcorder)

@@ -286,9 +286,6 @@ ODDS: dict[str, str] = {
     "tricycle": "floor",
 }
 
-# Openings and things of these groups are drawn at the item's own place, never by the rules above.
-STRUCTURE = frozenset({"window", "door"})
-
 
 def role(item: Item) -> str:
     """The word by which rules ask for an item: its group, split where the place differs."""

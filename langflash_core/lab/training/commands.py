@@ -62,7 +62,7 @@ VALIDATION_SCENES = 48
 """Judged while training, every few minutes; more would cost more time than they tell."""
 
 
-def cache_plan(kind: str, scenes: int, first_seed: int | None = None, preset: str = "mini") -> CachePlan:
+def cache_plan(kind: str, scenes: int, preset: str = "mini") -> CachePlan:
     """The plan of one set: train (tokens, augmented), validation (tokens; furniture that rules drew
     from other seeds), held_out (pictures only; models by people whose library no training sees). Squares
     without tokens for a network that takes these.
@@ -70,19 +70,19 @@ def cache_plan(kind: str, scenes: int, first_seed: int | None = None, preset: st
     Raises:
         InputError: there is no such set.
     """
-    plan, network = _cache_plan(kind, scenes, first_seed), PRESETS[preset]
+    plan, network = _cache_plan(kind, scenes), PRESETS[preset]
     if not network.square:
         return plan
     side = round(network.native_area**0.5)
     return replace(plan, with_tokens=False, sizes=((side, side),))
 
 
-def _cache_plan(kind: str, scenes: int, first_seed: int | None) -> CachePlan:
+def _cache_plan(kind: str, scenes: int) -> CachePlan:
     if kind == "train":
-        return CachePlan(first_seed or 0, scenes)
+        return CachePlan(0, scenes)
     if kind == "validation":
         return CachePlan(
-            first_seed or VALIDATION_SEED,
+            VALIDATION_SEED,
             scenes,
             libraries=VALIDATION_LIBRARIES,
             augment=False,
@@ -90,7 +90,7 @@ def _cache_plan(kind: str, scenes: int, first_seed: int | None) -> CachePlan:
         )
     if kind == "held_out":
         return CachePlan(
-            first_seed or HELD_OUT_SEED,
+            HELD_OUT_SEED,
             scenes,
             libraries=HELD_OUT_LIBRARIES,
             with_tokens=False,
@@ -107,7 +107,6 @@ def run_cache(
     *,
     kind: str = "train",
     scenes: int = 4096,
-    first_seed: int | None = None,
     part: tuple[int, int] = (0, 1),
     preset: str = "mini",
 ) -> int:
@@ -120,7 +119,7 @@ def run_cache(
         start: weights file of the preset, whose encoder is used; None where the cache keeps no tokens.
     """
     torch.set_num_threads(1)
-    plan = cache_plan(kind, scenes, first_seed, preset)
+    plan = cache_plan(kind, scenes, preset)
     encoder = None
     if plan.with_tokens and start is not None:
         encoder = guided(initial_network(PRESETS[preset], start)).encoder

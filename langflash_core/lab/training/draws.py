@@ -122,7 +122,7 @@ def restore_draws(draws: list[Draws], states: list[dict[str, Tensor]]) -> None:
     if len(states) != len(draws) * world():
         raise InputError(
             f"this run has {len(states)} batches a step, not {len(draws) * world()}; "
-            f"go on with --batches {len(states)}, or begin anew with --restart"
+            f"go on with --batches {len(states)}, or choose another -o"
         )
     for own, state in zip(draws, states[rank() * len(draws) :], strict=False):
         own.restore(state)

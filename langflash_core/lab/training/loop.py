@@ -78,7 +78,6 @@ class LoopOptions:
     device: str = "cpu"
     seed: int = 0
     max_steps: int | None = None
-    resume: bool = True
     report_s: float = 20.0
     validate_s: float = 300.0
     save_s: float = 120.0
@@ -125,7 +124,7 @@ def train_stage(
     state = LoopState(ema={k: v.detach().clone() for k, v in stage_parameters(network, stage).items()})
     draws = begin_draws(words, options.batches, options.seed)
     path = run_dir / f"{stage.name}.pt"
-    if options.resume and path.exists():
+    if path.exists():
         state, drawn = restore_state(network, stage, optimiser, path)
         if drawn:
             restore_draws(draws, drawn)

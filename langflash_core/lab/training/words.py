@@ -16,7 +16,6 @@ from torch import Tensor
 from langflash_core.lab.training.shards import Label
 from langflash_core.language.vocabulary import OWN, further_words, groups_of, is_name, taught
 
-PAPER_LABELS = ("wall", "floor", "ceiling", "chair", "table", "sofa", "bed", "other")
 NAME_SHARE, GROUP_SHARE = 0.3, 0.3
 """How often an instance is called by its name or its group; further words take the rest."""
 SYNONYM = 0.6

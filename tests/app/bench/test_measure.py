@@ -60,31 +60,19 @@ def test_the_fast_mode_is_near_but_not_exact(rows):
     assert min(rows["fast relevance"][0].cpu) < min(rows["default"][0].cpu)
 
 
-@pytest.mark.parametrize("name", ["shader queries", "full D", "Gram matrix"])
-def test_another_way_to_the_norm_is_the_same_answer(rows, name):
-    if name not in rows:
+def test_shaders_answer_as_the_processor_does(rows):
+    if "shader queries" not in rows:
         pytest.skip("the default asks in shaders here")
-    default, other = rows["default"][1], rows[name][1]
+    default, other = rows["default"][1], rows["shader queries"][1]
     assert other.psnr == default.psnr
     # The same maps, packed to sixteen bits or as they are: 1e-5 of a cosine, temperature / 4 of it.
     assert abs(other.relevance_mean - default.relevance_mean) <= 3e-5
     assert abs(other.relevance_max - default.relevance_max) <= 1e-4
 
 
-def test_a_cut_at_three_sigma_and_halves_lose_something(rows):
-    assert rows["3 sigma cut"][1].relevance_mean > 1.5 * rows["default"][1].relevance_mean
+def test_halves_lose_something(rows):
     for name in ("half resolution", "quarter of Gaussians"):
         assert rows[name][1].psnr < rows["default"][1].psnr - 10
-
-
-def test_channels_are_the_same_language_and_few_of_them_are_less(rows):
-    tiles, whole = rows["tiles on the processor"][1], rows["all channels splatted"][1]
-    sixteen, three = (rows[f"{count} channels, decoded"][1] for count in (16, 3))
-    # The same Gaussians, drawn by the same rasteriser beside other features.
-    assert whole.psnr == pytest.approx(tiles.psnr, abs=1e-3)
-    assert whole.relevance_mean <= 2e-3  # float16 channels
-    assert whole.relevance_mean < sixteen.relevance_mean < three.relevance_mean
-    assert three.relevance_mean < 0.3  # better than chance: an answer lies in (0, 1)
 
 
 class _FarOverNear(SplatBuffers):
@@ -142,9 +130,7 @@ def test_the_default_must_come_first(gl, case):
 
 def test_a_picture_of_one_pixel(gl, case):
     tiny = dataclasses.replace(case, path=Path(tuple(c.resized(1, 1) for c in case.path.cameras), "by hand"))
-    for mode, times, errors in measure(
-        gl, tiny, modes_for(gl, case.scene, ["resolution", "cut"]), silent
-    ).rows:
+    for mode, times, errors in measure(gl, tiny, modes_for(gl, case.scene, ["resolution"]), silent).rows:
         assert len(times.frames) == 2 and 0 <= errors.relevance_max <= 1, mode.name
 
 

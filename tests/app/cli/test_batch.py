@@ -15,6 +15,7 @@ from PIL import Image
 from app.cli import main
 from langflash_core.base.files import held_alone
 from langflash_core.base.resources import asset_path
+from tests.app.cli.test_start import told
 
 SMALL = ("--size", "84", "--backend", "torch")
 ASKED = ("--prompt", "plant", "submarine", "--export", ".ply", ".csv", ".json", "transforms.json")
@@ -172,36 +173,28 @@ def test_interrupted(sets, tmp_path):
     assert rows(tmp_path / "out").items() >= first.items()
 
 
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        (("nowhere",), "neither a folder nor a table"),
-        (("{empty}",), "no sub-folders"),
-        (("{table}",), "lines 1 and 3 are both called 'Den'"),
-        (("{sets}", "--export", ".doc"), "--export .doc is not an ending"),
-        (("{sets}", "--export", ".langflash"), "--export .langflash is not an ending"),
-        (("{sets}", "--export", ".json"), "needs a phrase"),
-        (("{sets}", "--prompt", " "), "a prompt is empty"),
-        (("{sets}", "--weights", "{table}"), "not a readable safetensors file"),
-        (("{sets}", "--workers", "0"), "--workers"),
-        (("{sets}", "-o", "{sets}"), "choose another -o"),
-        (("{sets}", "-o", "{table}"), "is not a folder"),
-    ],
-)
-def test_bad_input(words, said, sets, tmp_path):
-    (tmp_path / "empty").mkdir()
-    (tmp_path / "sets.csv").write_text("den,a.jpg\nhall,b.jpg\nDen,c.jpg\n")
-    places = {"empty": tmp_path / "empty", "table": tmp_path / "sets.csv", "sets": sets}
-    words = [word.format(**places) for word in words]
-    output = () if "-o" in words else ("-o", tmp_path / "out")
-    # Checked in a process of its own: none of it needs torch.
-    code = (
-        "import sys; from app.cli import main; c = main(sys.argv[1:]); sys.exit(c + ('torch' in sys.modules))"
+def test_bad_input(sets, tmp_path):
+    """None of it needs torch."""
+    empty, table, out = tmp_path / "empty", tmp_path / "sets.csv", tmp_path / "out"
+    empty.mkdir()
+    table.write_text("den,a.jpg\nhall,b.jpg\nDen,c.jpg\n")
+    cases = (
+        (("nowhere", "-o", out), "neither a folder nor a table"),
+        ((empty, "-o", out), "no sub-folders"),
+        ((table, "-o", out), "lines 1 and 3 are both called 'Den'"),
+        ((sets, "-o", out, "--export", ".doc"), "--export .doc is not an ending"),
+        ((sets, "-o", out, "--export", ".langflash"), "--export .langflash is not an ending"),
+        ((sets, "-o", out, "--export", ".json"), "needs a phrase"),
+        ((sets, "-o", out, "--prompt", " "), "a prompt is empty"),
+        ((sets, "-o", out, "--weights", table), "not a readable safetensors file"),
+        ((sets, "-o", out, "--workers", "0"), "--workers"),
+        ((sets, "-o", sets), "choose another -o"),
+        ((sets, "-o", table), "is not a folder"),
     )
-    command = [sys.executable, "-c", code, "batch", *words, *output]
-    done = subprocess.run([str(word) for word in command], capture_output=True, text=True)
-    assert done.returncode == 2 and said in done.stderr and done.stderr.count("\n") == 1, done.stderr
-    assert not (tmp_path / "out").exists()
+    found = told([("batch", *words) for words, _ in cases])
+    for (words, said), (code, _, err) in zip(cases, found, strict=True):
+        assert code == 2 and said in err and err.count("\n") == 1, (words, err)
+    assert not out.exists()
 
 
 def test_another_table_called_ledger(sets, run, tmp_path):

@@ -50,14 +50,15 @@ def test_imported_checkpoints_make_a_scene(run, checkpoints, tmp_path):
     assert not any("detail" in note for note in made["warnings"])
 
 
-@pytest.mark.parametrize("asked", [("--detail", "high"), ("--gaussians", 2000)])
-def test_a_detail_that_was_asked_for_is_left_out_and_that_is_said(run, checkpoints, tmp_path, asked):
+def test_a_detail_that_was_asked_for_is_left_out_and_that_is_said(run, checkpoints, tmp_path):
     for path in checkpoints[:2]:
         run("weights", "import", path)
     scene = tmp_path / "room.langflash"
-    made = run("reconstruct", *PHOTOS, "--preset", "full", "--size", 64, *asked, "-o", scene, "--json").json()
-    (note,) = [note for note in made["warnings"] if "detail" in note]
-    assert note.startswith("the preset 'full'") and note in load(scene).record.warnings
+    for asked in (("--detail", "high"), ("--gaussians", 2000)):
+        words = ("--preset", "full", "--size", 64, *asked, "-o", scene, "--json")
+        made = run("reconstruct", *PHOTOS, *words).json()
+        (note,) = [note for note in made["warnings"] if "detail" in note]
+        assert note.startswith("the preset 'full'") and note in load(scene).record.warnings
 
 
 def test_what_cannot_be_done_is_one_sentence(run, checkpoints, tmp_path):
@@ -72,29 +73,24 @@ def test_what_cannot_be_done_is_one_sentence(run, checkpoints, tmp_path):
         (("--grouping", "queries"), "grouping has no weights"),
         (("--grouping", "sam2"), "SAM 2 is not at hand"),
         (("--preset", "mini", "--grouping", "mobile-sam"), "MobileSAM's weights are not at hand"),
-        (("--refine", 99999), "out of range"),
         (("--preset", "mini", "--aggregation", "crops"), "crops are embedded by CLIP"),
     ):
         refused = run(*words, *more)
         assert refused.code == 2 and said in refused.err and refused.err.count("\n") == 1, refused
-    assert "at least two" in run("reconstruct", PHOTOS[0], "--refine", 1, "-o", scene).err
     assert not scene.exists()
 
 
-def test_the_stage_table_of_the_network(run, tmp_path):
-    out = tmp_path / "network.json"
-    words = ("--random", "--views", 2, 3, "--atoms", 4, 9, "--repeats", 1, "--size", 64, "-o", out)
-    document = run("lab", "bench-network", *words, "--json").json()
-    rows = {(r["precision"], r["views"], r["atoms"], r["stage"]): r for r in document["rows"]}
-    assert len(rows) == 2 * 2 * 2 * 6 and out.is_file()
-    for (precision, views, atoms, stage), row in rows.items():
-        assert row["seconds"] > 0
-        whole = rows[precision, views, atoms, "all"]["seconds"]
-        assert row["seconds"] <= whole
-        if precision == "bfloat16" and stage != "all":
-            # 8 bits a number, and some thirty layers of random weights: a few per cent.
-            assert 0 <= row["error"] < 0.3
-    table = run("lab", "bench-network", *words, "--float32").out
-    assert "| float32 | 3 | 9 | aggregation |" in table and "bfloat16" not in table
-    refused = run("lab", "bench-network", "--random", "--size", 100)
-    assert refused.code == 2 and "multiple of 16" in refused.err
+def test_weights_verify(run):
+    checkpoint = asset_path("weights/mini.safetensors")
+    document = run("weights", "verify", checkpoint, "--json").json()
+    (entry,) = document["weights"]
+    assert entry["preset"] == "mini" and entry["sound"] and entry["bytes"] == checkpoint.stat().st_size
+    assert "sound" in run("weights", "verify", checkpoint).out
+
+
+def test_weights_verify_notices_damage(run, tmp_path):
+    content = asset_path("weights/mini.safetensors").read_bytes()
+    cut = tmp_path / "cut.safetensors"
+    cut.write_bytes(content[: len(content) // 2])
+    outcome = run("weights", "verify", cut)
+    assert outcome.code == 2 and "cut.safetensors" in outcome.err and outcome.out == ""

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import torch
 
-from app.gl import SplatRenderer
+from app.gl import SplatRenderer, paints
 from app.gl.colours import feature_axes
 from app.gl.painter import Painter
 from app.gl.paints import PAINTS, Wanted
@@ -81,7 +81,7 @@ def test_masks_are_what_passes_its_own_threshold(asked, truth, style):
     }[style]
     expected = np.where(shown[..., None], yes, no)
     sure = clear_of(relevance - THRESHOLDS[:, None, None]) & (np.abs(frame.alphas.numpy() - 0.5) > 1e-4)
-    picture = pixels(asked.mask_texture(style, COLOURS, THRESHOLDS))
+    picture = pixels(paints.masks(asked, style, COLOURS, THRESHOLDS))
     assert shown.any() and not shown.all() and sure.mean() > 0.95
     np.testing.assert_allclose(picture[sure], expected[sure], atol=STEP)
 
@@ -95,7 +95,7 @@ def test_the_margin_is_best_less_second_best_or_less_the_threshold(asked, truth,
     margin = values[-1] - (values[-2] if count > 1 else 0.45)
     expected = ((margin + 0.3) / 0.8).clip(0, 1)
     covered = frame.alphas.numpy() >= 0.5
-    picture = pixels(asked.margin_texture(0.45, (-0.3, 0.5), "grey", over_rgb=False))[..., 0]
+    picture = pixels(paints.margin(asked, 0.45, (-0.3, 0.5), "grey", over_rgb=False))[..., 0]
     np.testing.assert_allclose(picture, np.where(covered, expected, 0), atol=STEP)
     assert np.ptp(margin[covered]) > 0.05
 
@@ -103,7 +103,7 @@ def test_the_margin_is_best_less_second_best_or_less_the_threshold(asked, truth,
 @pytest.mark.parametrize("atom", [0, 7, 11])
 def test_a_weight_map_is_that_of_its_atom(asked, truth, atom):
     maps = maps_of(render(truth, camera())).numpy()
-    picture = pixels(asked.weight_texture(atom, "grey"))[..., 0]
+    picture = pixels(asked.picture().weight(atom, "grey"))[..., 0]
     np.testing.assert_allclose(picture, maps[..., atom].clip(0, 1), atol=STEP)
     assert picture.max() > 0.2
 
@@ -115,15 +115,13 @@ def test_an_atom_out_of_view_weighs_nothing(exact):
         dataclasses.replace(scene, semantics=dataclasses.replace(scene.semantics, weight_ids=ids))
     )
     exact.draw(camera())
-    assert pixels(exact.weight_texture(2, "grey")).max() > 0
-    assert pixels(exact.weight_texture(3, "grey")).max() == 0
-    with pytest.raises(ValueError, match="atom: expected 0 to 3, received 4"):
-        exact.weight_texture(4)
+    assert pixels(exact.picture().weight(2, "grey")).max() > 0
+    assert pixels(exact.picture().weight(3, "grey")).max() == 0
 
 
 def test_transmittance_is_what_passes(asked, truth):
     alphas = render(truth, camera()).alphas.numpy()
-    wanted = Wanted(np.zeros((0, 3)), np.zeros(0), 0, 0.0, 0, HeatColours("grey"))
+    wanted = Wanted((), (), 0, 0.0, 0, HeatColours("grey"))
     picture = PAINTS[pictures.TRANSMITTANCE](asked, wanted)
     np.testing.assert_allclose(pixels(picture)[..., 0], 1 - alphas, atol=STEP)
 
@@ -151,7 +149,7 @@ def test_features_are_the_principal_axes_of_f(asked, truth):
         sign = np.sign(of_atoms[np.abs(of_atoms).argmax()])
         expected[..., place] = 0.5 + sign * along / (4 * np.sqrt(values[-1 - place]))
     covered = total >= 2 / 255  # clear of the cut at 1 / 255
-    picture = pixels(asked.feature_texture())
+    picture = pixels(asked.picture().features())
     # Maps packed to 16 bits of the peak, as in all queries: 8e-6 of it, over the smallest deviation.
     np.testing.assert_allclose(picture[covered], expected.clip(0, 1)[covered], atol=STEP + 1e-3)
     assert (picture[total < 0.5 / 255] == 0).all() and np.ptp(picture[covered], axis=0).min() > 0.3
@@ -162,7 +160,7 @@ def test_features_of_one_atom_are_grey_and_of_none_black(exact):
     assert (columns == [[0.5, 0.5, 0.5, 1.0]]).all()
     exact.set_scene(cloud(50, 0, dtype=torch.float32))
     exact.draw(camera())
-    assert pixels(exact.feature_texture()).max() == 0
+    assert pixels(exact.picture().features()).max() == 0
 
 
 def stereo(double: bool = True) -> Scene:
@@ -222,7 +220,7 @@ def test_coverage_counts_the_photos_that_saw_a_pixel(exact):
     count = (np.abs(found - 1) <= SAME).sum(0)
     exact.set_scene(stereo(double=False))
     exact.draw(SEEN_FROM)
-    picture = pixels(exact.coverage_texture())
+    picture = pixels(paints.trust(exact, False))
     # Each count's colour lies far from the others', whatever the grey of the photo below it.
     nearest = np.argmin([np.ptp(picture - 0.7 * np.array(c), axis=-1) for c in COUNT_COLOURS], axis=0)
     assert {0, 1, 2} <= set(count[covered])
@@ -238,7 +236,7 @@ def test_agreement_is_the_worst_ratio_of_two_photos_own_depths(exact):
     both = covered & (tells.sum(0) == 2)
     exact.set_scene(stereo(double=False))
     exact.draw(SEEN_FROM)
-    picture = pixels(exact.agreement_texture())
+    picture = pixels(paints.trust(exact, True))
     bar = colour_bar(COLOUR_MAPS[0])[0] / 255
     expected = bar[(worst / WORST * 255).round().clip(0, 255).astype(int)]
     shade = (picture - 0.7 * expected)[both]  # what is left is grey
@@ -254,13 +252,13 @@ def test_photo_depths_follow_the_scene_and_leave_it_alone(exact):
     exact.set_scene(scene)
     exact.draw(SEEN_FROM)
     before = exact.frame().rgb
-    exact.coverage_texture()
+    paints.trust(exact, False)
     assert torch.equal(exact.frame().rgb, before) and exact.passes["colour"] == 1
     bare = dataclasses.replace(scene, view_ids=None)
     exact.set_scene(bare)
     exact.draw(SEEN_FROM)
     with pytest.raises(ValueError, match="view_ids"):
-        exact.agreement_texture()
+        paints.trust(exact, True)
 
 
 def test_photo_depths_are_the_references(gl, exact):
@@ -276,10 +274,3 @@ def test_photo_depths_are_the_references(gl, exact):
         expected = np.where(frame.alphas >= 0.5, frame.depths, 0)
         # Float32 sums of a few hundred terms, as in test_gl_against_reference.py.
         np.testing.assert_allclose(drawn[view][sure], expected[sure], atol=1e-4)
-
-
-def test_masks_refuse_what_does_not_fit(asked):
-    with pytest.raises(ValueError, match="masks: expected"):
-        asked.mask_texture("flat", COLOURS[:2], THRESHOLDS)
-    with pytest.raises(ValueError, match="masks: expected"):
-        asked.mask_texture("round", COLOURS, THRESHOLDS)

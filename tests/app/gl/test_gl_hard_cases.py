@@ -401,7 +401,7 @@ def test_atoms_that_are_not_finite_say_nothing(renderer, bad):
         renderer.set_scene(changed)
         renderer.draw(camera())
         renderer.ask(question(changed))
-        results.append((renderer.relevance(), pixels(renderer.atom_texture())))
+        results.append((renderer.relevance(), pixels(renderer.picture().atoms())))
     assert torch.equal(results[0][0], results[1][0]) and results[0][0].max() > 0
     assert torch.equal(results[0][1], results[1][1])
 

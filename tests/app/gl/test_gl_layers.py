@@ -8,7 +8,7 @@ import pytest
 import torch
 from torch.nn.functional import interpolate
 
-from app.gl import SplatRenderer
+from app.gl import SplatRenderer, paints
 from app.gl.hardware import CARD, PROCESSOR, hardware_of
 from app.gl.layered import KEPT, MOVING, LayeredLevel, half
 from app.gl.processor.cell_maps import CellMaps
@@ -19,6 +19,7 @@ from langflash_core.base.records import Record
 from langflash_core.errors import Cancelled
 from langflash_core.geometry.cameras import invert_rigid
 from langflash_core.geometry.harmonics import colour_to_sh
+from langflash_core.geometry.nearness import Nearness
 from langflash_core.scene.changed import changed
 from langflash_core.scene.changes import Moved, Recoloured
 from langflash_core.scene.mask import Mask
@@ -198,8 +199,8 @@ def test_a_new_phrase_at_rest_draws_no_splat(renderer):
     renderer.relevance()
     renderer.heat_texture(2)
     renderer.label_texture()
-    renderer.atom_texture()
-    renderer.feature_texture()
+    renderer.picture().atoms()
+    renderer.picture().features()
     kinds = ("colour", "weights", "blend", "pack")
     assert [renderer.passes[kind] for kind in kinds[:3]] == [passes[kind] for kind in kinds[:3]]
 
@@ -253,7 +254,7 @@ def test_changes_reach_every_layer(gl):
 def test_pictures_are_continuous_where_another_layer_comes_in(gl):
     """Steps of a walk along six photos: where the nearest four change, by no more than elsewhere."""
     scene = layered(6)
-    nearness = compose.Nearness.of(scene)
+    nearness = Nearness.of(scene)
     places = np.linspace(1.2, 3.8, 105)
     seen = [camera(48, 40, 40.0, turned(0.04 * p, (-0.12 * p, 0.02, 0.03))) for p in places]
     renderer = SplatRenderer(gl, "float32")
@@ -287,7 +288,7 @@ def enlarged(frame: Frame, size: tuple[int, int]) -> Frame:
 
 def moving_twin(scene: Scene, seen: Camera, weight_maps: bool = False) -> Frame:
     """What moves on a processor: the two nearest layers blended, the farther in half the size."""
-    chosen = compose.Nearness.of(scene).chosen(seen, MOVING)
+    chosen = Nearness.of(scene).chosen(seen, MOVING)
     layers = [scene.layer(view) for view in chosen.views]
     first = reference.render(layers[0], seen, weight_maps=weight_maps)
     if len(layers) == 1:
@@ -335,7 +336,7 @@ def test_no_picture_jumps_on_a_walk(gl):
             pictures.append(renderer.frame().rgb.double().numpy())
         steps[moving] = np.abs(np.diff(pictures, axis=0)).mean((1, 2, 3))
     renderer.release()
-    nearness = compose.Nearness.of(scene)
+    nearness = Nearness.of(scene)
     nearest = [nearness.chosen(each, MOVING).views[0] for each in seen]
     assert sum(one != other for one, other in pairwise(nearest)) == 5
     assert steps[True].max() / np.median(steps[True]) <= 1.2 * steps[False].max() / np.median(steps[False])
@@ -348,7 +349,7 @@ def test_layers_are_made_one_a_call(renderer):
     level = renderer._scene.whole
     calls = 0
     for view in (0, 3, 6, 9, 2):
-        chosen = set(compose.Nearness.of(scene).chosen(scene.camera(view)).views)
+        chosen = set(Nearness.of(scene).chosen(scene.camera(view)).views)
         missing = len(chosen - set(level._layers))
         made, ready = set(level._layers), False
         while not ready:
@@ -408,7 +409,7 @@ def test_on_a_card_a_moving_picture_is_blended_too(gl, precision, num_views):
     renderer.set_scene(scene)
     renderer.ask(compiled)
     renderer.draw(seen, fast=True)
-    layers = len(compose.Nearness.of(scene).chosen(seen).views)
+    layers = len(Nearness.of(scene).chosen(seen).views)
     assert renderer.passes["colour"] == layers and not renderer.passes["weights"]
     error = (renderer.relevance() - twin(scene, compiled, seen)).abs()
     # As in test_gl_fast.py: a step or two are lost in the mean, here also where layers are added.
@@ -499,7 +500,7 @@ def test_a_still_picture_agrees_with_the_reference(num_views):
 def test_a_still_picture_of_two_layers_is_blended_of_the_nearest():
     scene, seen = layered(6), between(6)
     still = draw_still(scene, seen, most=2)
-    chosen = compose.Nearness.of(scene).chosen(seen, 2)
+    chosen = Nearness.of(scene).chosen(seen, 2)
     frames = [reference.render(doubled(scene).layer(view), seen) for view in chosen.views]
     expected = compose.blended(frames, chosen.weights)
     assert psnr(still.frame.rgb, expected.rgb) >= 60 and still.maps is not None  # as above
@@ -507,7 +508,7 @@ def test_a_still_picture_of_two_layers_is_blended_of_the_nearest():
     assert psnr(compose.render(doubled(scene), seen).rgb, expected.rgb) < 40
 
 
-def test_a_still_picture_is_the_renderers_marked_and_carried(gl):
+def test_a_still_picture_is_the_renderers_marked(gl):
     scene, seen = layered(3), between(3)
     random, count = np.random.default_rng(0), len(scene.gaussians)
     marks = random.random(count) < 0.7, random.integers(0, 3, count).astype(np.uint8)
@@ -517,10 +518,9 @@ def test_a_still_picture_is_the_renderers_marked_and_carried(gl):
     renderer.draw(seen)
     own, span = renderer.frame(weight_maps=True), renderer.depth_range
     renderer.release()
-    carried = scene.semantics.dense_weights()[:, :3]
-    still = draw_still(scene, seen, marks=marks, carried=carried)
+    still = draw_still(scene, seen, marks=marks)
     assert psnr(still.frame.rgb, own.rgb) >= 50 and still.maps is not None
-    assert (still.maps.weights - maps_of(own)[..., :3]).abs().mean() < 2e-3
+    assert (still.maps.weights - maps_of(own)).abs().mean() < 2e-3
     assert still.depth_range == pytest.approx(span, rel=0.05)  # OpenGL counts what lies just beside the image
 
 
@@ -591,8 +591,8 @@ def test_a_photo_sees_its_own_layer(gl):
     renderer = SplatRenderer(gl, "float32")
     renderer.set_scene(scene)
     renderer.draw(between(3))
-    renderer.coverage_texture()
-    renderer.agreement_texture()
+    paints.trust(renderer, False)
+    paints.trust(renderer, True)
     live = renderer._scene
     assert live is not None
     photos = live.photo_depths(False)

@@ -3,6 +3,7 @@
 import pytest
 import torch
 
+from app.gl import paints
 from langflash_core.scene.thin import thin, thin_with_rows
 from langflash_core.splat import render
 from tests.app.gl.questions import full_relevance, question
@@ -43,7 +44,7 @@ def test_pictures_follow_the_level_and_the_scene(renderer, scene):
     shown = []
     for share in (1.0, 0.25, 1.0):
         renderer.draw(camera(), share=share)
-        shown.append((renderer.rgb_texture.read(), renderer.depth_texture().read()))
+        shown.append((renderer.rgb_texture.read(), paints.depth(renderer).read()))
     assert shown[0] == shown[2]
     assert shown[0][0] != shown[1][0] and shown[0][1] != shown[1][1]
     renderer.set_scene(cloud(50, 5, dtype=torch.float32))

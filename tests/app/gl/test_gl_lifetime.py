@@ -4,13 +4,14 @@ import ctypes
 import mmap
 import random
 from dataclasses import replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import pytest
 
 from app.cli.renderers import open_renderer
-from app.gl import SplatRenderer, offscreen_context
+from app.gl import SplatRenderer, offscreen_context, paints
 from app.gl.canvas import Canvas
 from app.gl.carried import atom_bits
 from app.gl.hardware import hardware_of
@@ -73,9 +74,8 @@ def test_nothing_leaks_in_1000_frames(gl, queries, use_another_program):
         )
         renderer.ask(question(scene, shake.randrange(1, 9)))
         renderer.heat_texture(0)
-        shake.choice(
-            [renderer.label_texture, renderer.atom_texture, renderer.depth_texture, renderer.frame]
-        )()
+        atoms, depth = renderer.picture().atoms, partial(paints.depth, renderer)
+        shake.choice([renderer.label_texture, atoms, depth, renderer.frame])()
         assert gl.error == "GL_NO_ERROR"
         megabytes.append(resident_megabytes())
     assert living(gl) != before
@@ -181,7 +181,7 @@ def _everything(renderer: SplatRenderer, scene: Scene) -> list[bytes]:
 def _pictures(renderer: SplatRenderer) -> list[bytes]:
     frame = renderer.frame(weight_maps=True)
     tensors = (frame.rgb, frame.depths, maps_of(frame), renderer.relevance())
-    textures = (renderer.rgb_texture, renderer.heat_texture(1), renderer.atom_texture())
+    textures = (renderer.rgb_texture, renderer.heat_texture(1), renderer.picture().atoms())
     return [*(values.numpy().tobytes() for values in tensors), *(texture.read() for texture in textures)]
 
 
@@ -243,7 +243,7 @@ def test_layers_leave_nothing(gl, use_another_program, blends_all):
         renderer.relevance()
         renderer.draw(seen)
         renderer.relevance()
-        renderer.coverage_texture()
+        paints.trust(renderer, False)
     assert living(gl) != before
     renderer.release()
     use_another_program()

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import torch
 
-from app.gl import SplatRenderer
+from app.gl import SplatRenderer, paints
 from langflash_core.export.png import glow_share
 from langflash_core.scene.gaps import filled
 from langflash_core.scene.trust import faded
@@ -102,7 +102,7 @@ def test_atoms_have_one_colour_each(renderer):
     scene = dataclasses.replace(scene, gaussians=solid)
     renderer.set_scene(scene)
     renderer.draw(camera())
-    shown = pixels(renderer.atom_texture())
+    shown = pixels(renderer.picture().atoms())
     maps = maps_of(renderer.frame(weight_maps=True)).numpy()
     pure = [maps[..., k] > 0.97 for k in range(3)]
     means = np.stack([shown[mask][:, :3].mean(0) for mask in pure])
@@ -114,7 +114,7 @@ def test_near_and_far_have_other_colours(renderer):
     gaussians = splats([(-0.4, 0.0, 1.5), (0.8, 0.0, 3.0)], [0.1, 0.2], 1.0, dtype=torch.float32)
     renderer.set_scene(scene_of(gaussians))
     renderer.draw(camera())
-    shown = pixels(renderer.depth_texture("grey"))[..., 0]
+    shown = pixels(paints.depth(renderer, "grey"))[..., 0]
     assert shown[20, 13] > 0.95 and shown[20, 34] < 0.05 and shown[0, 0] == 0
 
 
@@ -254,7 +254,7 @@ def test_filled_gaps_change_what_is_seen_and_nothing_that_is_known(asked):
         return {
             "heat": pixels(asked.heat_texture(0)),
             "labels": pixels(asked.label_texture(colours)),
-            "dim": pixels(asked.mask_texture("dim", colours, cuts)),
+            "dim": pixels(paints.masks(asked, "dim", colours, cuts)),
         }
 
     asked.draw(from_aside())

@@ -18,6 +18,7 @@ from app.window.kit.look import Look
 from app.window.opening import commands as opening
 from app.window.opening.state import Film, Folder
 from app.window.scene import commands as show
+from app.window.scene import merging
 from app.window.scene.drops import There, Typed
 from app.window.state import State
 from langflash_core.images.strip import Still, Strip
@@ -56,7 +57,7 @@ ORANGE: dict[Dialog, type[Command]] = {
     Dialog.LEAVE: show.SaveFirst,
     Dialog.DROP: show.Instead,
     Dialog.DROP_SCENE: show.Instead,
-    Dialog.MERGE: show.MergeScene,
+    Dialog.MERGE: merging.MergeScene,
     Dialog.PLACE: opening.PlaceFound,
     Dialog.FILM: opening.TakeFrames,
     Dialog.UNSAVED: show.SaveFirst,

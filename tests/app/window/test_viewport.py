@@ -20,6 +20,7 @@ from app.window.scene.memory import SceneMemory
 from app.window.state import State
 from app.window.viewport import Viewport
 from langflash_core.base import pictures
+from langflash_core.geometry.nearness import NEAREST
 from langflash_core.geometry.poses import from_view, orbit
 from langflash_core.language.relevance import compile_query
 from langflash_core.language.spaces import language_space
@@ -29,7 +30,6 @@ from langflash_core.scene.edits import History, delete
 from langflash_core.scene.exposure import lit_camera
 from langflash_core.scene.mask import Mask
 from langflash_core.scene.thin import thin_with_rows
-from langflash_core.splat.compose import NEAREST
 from tests.app.gl.test_gl_layers import layered
 from tests.app.window.scenes import PHRASES, after, room, shown_scene
 

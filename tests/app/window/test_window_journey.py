@@ -19,7 +19,6 @@ pytestmark = test_window.pytestmark
 
 LAUNCH_SECONDS = 3.0  # from the command to the first frame, warm, on 2 cores
 HELD_SECONDS = 0.250  # by which a frame may come late while a scene is made, without drawing the scene
-SLOWER_SECONDS = 0.100  # that a frame may take longer while typing
 SMALL = (LEFT + 640, TOP + 480 + int(theme.STATUS_HEIGHT))  # a window whose picture is 640 x 480
 LARGE = (1280, 800)
 

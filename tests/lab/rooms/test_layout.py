@@ -16,7 +16,6 @@ from langflash_core.lab.rooms.plan import ON_TOP, ROOM_PLANS, ROOM_SHARES
 from langflash_core.lab.rooms.shell import CEILING, FLOOR, make_shell, shell_triangles
 
 HELD_OUT_ROOMS = "7bd4a45a1ae0a2c2ac462e3d24d3c19cbb2ad22d432157337c9cf29f6dd4ecd5"
-SOFT = {"bed", "sofa", "armchair", "chair", "bench"}
 
 
 def test_held_out_furniture_never_trains(split_pack: Pack) -> None:

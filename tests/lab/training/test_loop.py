@@ -41,12 +41,6 @@ def test_a_run_continues_where_it_stopped(rooms, words, network, tmp_path: Path)
     assert all(math.isfinite(row["loss"]) for row in rows if row["kind"] == "train")
 
 
-def test_a_restart_forgets(rooms, words, network, tmp_path: Path):
-    train_stage(network(), STAGE, rooms, words, tmp_path, OPTIONS)
-    state = train_stage(network(), STAGE, rooms, words, tmp_path, replace(OPTIONS, resume=False, max_steps=1))
-    assert state.step == 1
-
-
 def test_a_run_of_other_parts_does_not_go_on(rooms, words, network, tmp_path: Path):
     """As one from before a part was there: one sentence, not the optimiser's complaint."""
     train_stage(network(), STAGE, rooms, words, tmp_path, replace(OPTIONS, max_steps=1))

@@ -19,5 +19,4 @@ def held_out(args: Namespace, rooms: int) -> tuple[Pack, range]:
     if args.keep is not None:
         check_folder(args.keep, "--keep")
     pack = load_pack(readable_file(args.pack, "furniture pack", InputError))
-    first = HELD_OUT_SEED if args.first_seed is None else args.first_seed
-    return pack, range(first, first + (args.limit or rooms))
+    return pack, range(HELD_OUT_SEED, HELD_OUT_SEED + (args.limit or rooms))

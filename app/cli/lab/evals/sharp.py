@@ -97,7 +97,7 @@ def _subjects(args: Namespace) -> "Iterator[tuple[Iterator[Subject] | list[Subje
     elif args.pack is not None:
         pack, count = load_pack(readable_file(args.pack, "furniture pack", InputError)), args.limit or ROOMS
         with RoomRenderer(pack) as drawer:
-            yield room_subjects(pack, drawer, kind=args.set, count=count, first=args.first_seed), count
+            yield room_subjects(pack, drawer, kind=args.set, count=count), count
     else:
         for path in args.photos:
             if not path.is_dir():

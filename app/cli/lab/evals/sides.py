@@ -1,4 +1,4 @@
-"""`lab eval sides` and `sides-beside`: scenes seen from aside, by one version of the code or by two."""
+"""`lab eval sides`: scenes seen from aside."""
 
 from argparse import Namespace
 from collections.abc import Callable, Iterator
@@ -98,18 +98,6 @@ def _pictures(args: Namespace, render: Render) -> Callable[[Case, Scene], None]:
     return made
 
 
-def beside(args: Namespace, out: TextIO) -> None:
-    """Two results of the same scenes in one table.
-
-    Raises:
-        InputError: a folder holds no results, or they have no scene in common.
-    """
-    check_files(args)
-    from langflash_core.lab.evaluation.side_tables import beside_markdown
-
-    RESULTS.beside(args, beside_markdown, out)
-
-
 @contextmanager
 def _cases(args: Namespace) -> Iterator[tuple[Iterator, int]]:
     """What is judged, and how much of it."""
@@ -127,4 +115,4 @@ def _cases(args: Namespace) -> Iterator[tuple[Iterator, int]]:
     readable_file(args.pack, "furniture pack", InputError)
     pack, count = load_pack(args.pack), args.limit or ROOMS
     with RoomRenderer(pack) as renderer:
-        yield room_cases(pack, renderer, kind=args.set, count=count, first=args.first_seed), count
+        yield room_cases(pack, renderer, kind=args.set, count=count), count

@@ -1,4 +1,4 @@
-"""`lab eval walk` and `walk-beside`: the same place in 2, 4, 8 ... photos, by one version or by two."""
+"""`lab eval walk`: the same place in 2, 4, 8 ... photos."""
 
 from argparse import Namespace
 from collections.abc import Iterator
@@ -34,8 +34,8 @@ ROOMS, STRETCHES = 20, 4
 WALKS = "walks"
 """The folder of results that keeps single walks."""
 OPTIONS = (
-    "size", "set", "way", "exposure", "blur", "step", "assume_lens", "given_poses", "no_own", "align",
-    "memory", "colmap", "seen_aside", "depth_unit", "crop", "intrinsics", "passers", "screens",
+    "size", "set", "exposure", "blur", "step", "assume_lens", "no_own", "align", "memory",
+    "colmap", "seen_aside", "depth_unit", "crop", "intrinsics", "passers", "screens",
 )  # fmt: skip
 """By which numbers of a walk change."""
 
@@ -126,7 +126,6 @@ def _bench(args: Namespace, renderer: Renderer) -> "Bench":
         args.preset,
         args.size,
         assume_lens=args.assume_lens,
-        given_poses=args.given_poses,
         alone=not args.no_own,
         align=args.align,
         lpips=opened_lpips(args.lpips),
@@ -150,18 +149,6 @@ def _shelf(args: Namespace, plan: "Plan", bench: "Bench") -> "Shelf":
         "lpips": bench.lpips and bench.lpips.digest,
     }
     return Shelf(args.results / WALKS, key, Tally)
-
-
-def beside(args: Namespace, out: TextIO) -> None:
-    """Two results of the same walks in one table.
-
-    Raises:
-        InputError: a folder holds no results, or they have no walk in common.
-    """
-    check_files(args)
-    from langflash_core.lab.evaluation.walk_tables import beside_markdown
-
-    RESULTS.beside(args, beside_markdown, out)
 
 
 def _write_plot(path: Path, result: dict) -> None:
@@ -188,14 +175,4 @@ def _walks(args: Namespace, plan: "Plan") -> "Iterator[tuple[Iterator[Walk], int
         args.exposure or 0.0, args.blur or 0.0, passers=args.passers or 0, screens=args.screens or 0
     )
     with RoomRenderer(pack) as drawer:
-        walks = room_walks(
-            pack,
-            drawer,
-            plan,
-            way=args.way,
-            camcorder=camcorder,
-            kind=args.set,
-            count=count,
-            first=args.first_seed,
-        )
-        yield walks, count
+        yield room_walks(pack, drawer, plan, camcorder=camcorder, kind=args.set, count=count), count

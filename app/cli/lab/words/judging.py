@@ -76,6 +76,7 @@ def add_eval(commands) -> None:
     _add_sides(actions)
     _add_sharp(actions)
     _add_walk(actions)
+    _add_beside(actions)
     _add_real(actions)
     _add_phrases(actions)
     _add_level(actions)
@@ -162,18 +163,10 @@ def _add_sides(actions) -> None:
     command.add_argument("--limit", type=whole_count, metavar="N", help="rooms or pairs (default: 100 or 40)")
     command.add_argument("--lpips", type=Path, metavar="FILE", help="LPIPS weights of VGG-16, .safetensors")
     command.add_argument(
-        "--results", type=Path, metavar="DIR", help="also keep every scene's numbers, for sides-beside"
+        "--results", type=Path, metavar="DIR", help="also keep every scene's numbers, for beside"
     )
     command.add_argument("--sheet", type=Path, metavar="IMG", help="also six scenes from aside, as .png")
     _add_judging(command)
-    beside = new_command(
-        actions, "sides-beside", "two results of sides on the same scenes, beside each other"
-    )
-    beside.add_argument("before", type=Path, metavar="BEFORE", help="folder of --results")
-    beside.add_argument("after", type=Path, metavar="AFTER", help="folder of --results")
-    beside.add_argument("-o", "--output", type=Path, metavar="FILE", help="also write the table as .md")
-    beside.add_argument("--sheet", type=Path, metavar="IMG", help="also six scenes of both, as .png")
-    beside.set_defaults(json=False)
 
 
 def _add_sharp(actions) -> None:
@@ -221,7 +214,6 @@ def _add_level(actions) -> None:
     )
     command.add_argument("pack", type=Path, metavar="PACK", help="furniture, made by rooms pack")
     command.add_argument("--limit", type=whole_count, metavar="N", help="so many rooms (default: 100)")
-    command.add_argument("--first-seed", type=seed, metavar="N", help="(default: of the held-out rooms)")
     command.add_argument(
         "--photos", type=whole_count, default=2, metavar="N", help="of each room (default: 2)"
     )
@@ -237,7 +229,6 @@ def _add_moved(actions) -> None:
     command = new_command(actions, "moved", "what is found of things that were moved between two scenes")
     command.add_argument("pack", type=Path, metavar="PACK", help="furniture, made by rooms pack")
     command.add_argument("--limit", type=whole_count, metavar="N", help="so many rooms (default: 10)")
-    command.add_argument("--first-seed", type=seed, metavar="N", help="(default: of the held-out rooms)")
     command.add_argument(
         "--keep", type=Path, metavar="FOLDER", help="scenes that are made stay there and are read again"
     )
@@ -258,12 +249,6 @@ def _add_walk(actions) -> None:
     _add_walked(command)
     _add_room_set(command)
     command.add_argument(
-        "--way",
-        choices=("aside", "round"),
-        default="aside",
-        help="through a room: sideways, or round its middle, which takes 8 photos (default: aside)",
-    )
-    command.add_argument(
         "--exposure", type=above_zero, metavar="EV", help="each photo of a room is off by up to so many stops"
     )
     command.add_argument(
@@ -276,7 +261,6 @@ def _add_walk(actions) -> None:
         "--screens", type=whole_count, metavar="N", help="a screen shows another picture in so many photos"
     )
     command.add_argument("--assume-lens", action="store_true", help="do not say which lens the photos have")
-    command.add_argument("--given-poses", action="store_true", help="say where the photos were taken")
     command.add_argument(
         "--no-own", action="store_true", help="leave out what a kept frame's own two photos bring alone"
     )
@@ -292,19 +276,22 @@ def _add_walk(actions) -> None:
         "--results",
         type=Path,
         metavar="DIR",
-        help="keep every walk there, for walk-beside, and go on from it; one folder for each version",
+        help="keep every walk there, for beside, and go on from it; one folder for each version",
     )
     command.add_argument("--sheet", type=Path, metavar="IMG", help="also kept frames and scenes, as .png")
     command.add_argument(
         "--plot", type=Path, metavar="IMG", help="also time and memory against photos, as .png"
     )
     _add_judging(command)
-    beside = new_command(actions, "walk-beside", "two results of walk on the same walks, beside each other")
-    beside.add_argument("before", type=Path, metavar="BEFORE", help="folder of --results")
-    beside.add_argument("after", type=Path, metavar="AFTER", help="folder of --results")
-    beside.add_argument("-o", "--output", type=Path, metavar="FILE", help="also write the table as .md")
-    beside.add_argument("--sheet", type=Path, metavar="IMG", help="also kept frames of both, as .png")
-    beside.set_defaults(json=False)
+
+
+def _add_beside(actions) -> None:
+    command = new_command(actions, "beside", "two results of walk, or of sides, beside each other")
+    command.add_argument("before", type=Path, metavar="BEFORE", help="folder of --results")
+    command.add_argument("after", type=Path, metavar="AFTER", help="folder of --results")
+    command.add_argument("-o", "--output", type=Path, metavar="FILE", help="also write the table as .md")
+    command.add_argument("--sheet", type=Path, metavar="IMG", help="also pictures of both, as .png")
+    command.set_defaults(json=False)
 
 
 def _add_real(actions) -> None:
@@ -364,7 +351,6 @@ def _add_room_set(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "--set", choices=("held_out", "validation"), default="held_out", help="of rooms (default: held_out)"
     )
-    command.add_argument("--first-seed", type=seed, metavar="N", help="(default: the set's own range)")
 
 
 def _add_protocol(actions) -> None:

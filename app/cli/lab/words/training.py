@@ -177,7 +177,6 @@ def _add_cache(actions) -> None:
     add_output(cache, "CACHE", "folder to fill")
     cache.add_argument("--set", choices=("train", "validation", "held_out"), default="train")
     cache.add_argument("--scenes", type=whole_count, default=4096, metavar="N", help="(default: 4096)")
-    cache.add_argument("--first-seed", type=seed, metavar="N", help="(default: the set's own range)")
     cache.add_argument(
         "--part", type=part, default=(0, 1), metavar="I/N", help="the I-th of N processes, from 0"
     )
@@ -220,13 +219,6 @@ def _add_stages(actions) -> None:
         type=Path,
         metavar="FILE",
         help="weights of MobileSAM (mobile_sam.pt), whose embedding grouping regresses besides",
-    )
-    run.add_argument(
-        "--sam-side",
-        type=whole_count,
-        default=1024,
-        metavar="PX",
-        help="longer side of a view as SAM sees it (default: 1024, as it was trained; 384 takes a sixth)",
     )
     run.add_argument(
         "--from-scratch", action="store_true", help="draw the heads anew instead of going on with --start's"
@@ -345,9 +337,6 @@ def _add_loop(command: argparse.ArgumentParser) -> None:
     command.add_argument("--max-steps", type=whole_count, metavar="N", help="stop each stage earlier")
     command.add_argument("--device", choices=("cpu", "cuda"), default="cpu")
     command.add_argument("--seed", type=seed, default=0, metavar="N")
-    command.add_argument(
-        "--restart", action="store_true", help="forget what the run folder holds of these stages"
-    )
     command.add_argument(
         "--batches",
         type=whole_count,

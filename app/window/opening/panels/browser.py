@@ -13,6 +13,7 @@ from ...kit import theme, widgets
 from ...kit.look import Look
 from ...scene import commands as show
 from ...scene.drops import There, typed_path
+from ...scene.merging import MergeScene
 from ...state import State
 from .. import commands as opening
 from ..state import Folder, small
@@ -143,7 +144,7 @@ def _taken(state: State, path: Path) -> do.Command:
 def _opened(state: State, paths: tuple[Path, ...]) -> do.Command:
     """Open files, each once; or merge the last of them."""
     if state.dialog is Dialog.MERGE:
-        return show.MergeScene(paths[-1])
+        return MergeScene(paths[-1])
     return show.OpenPaths(tuple(map(str, dict.fromkeys(paths))))
 
 
@@ -171,7 +172,7 @@ def _buttons(state: State, confirmed: bool, look: Look) -> list[do.Command]:
     if typed and pressed:
         path = typed_path(typed)
         walks = confirmed and state.typed.there is There.FOLDER and typed.endswith(os.sep)
-        merge_or_open = show.MergeScene(path) if merging else show.OpenPaths((str(path),))
+        merge_or_open = MergeScene(path) if merging else show.OpenPaths((str(path),))
         issued.append(opening.LookInto(path) if walks else merge_or_open)
     elif chosen and pressed:
         issued.append(_opened(state, chosen))

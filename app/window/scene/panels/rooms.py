@@ -8,6 +8,7 @@ from ...kit import theme, widgets
 from ...kit.look import Look
 from ...state import State
 from .. import commands as show
+from ..merging import MergeScene
 from ..state import Room
 
 _NAMED = 4  # dropped photos that the question names
@@ -87,7 +88,7 @@ def draw_scene_drop(state: State, look: Look) -> list[do.Command]:
     widgets.tooltip("The current scene stays one click away")
     widgets.beside(look.px(190))
     if imgui.button("Merge into this scene", look.vec(190, 0)):
-        issued.append(show.MergeScene(path))
+        issued.append(MergeScene(path))
     widgets.tooltip("Added beside the scene, ready to be moved; Ctrl+Z undoes")
     widgets.beside(look.px(110))
     if imgui.button("Cancel", look.vec(110, 0)):

@@ -96,7 +96,7 @@ def read_recipe(name: str, options: LoopOptions) -> Recipe:
     """A recipe by its name, or that of a file.
 
     Args:
-        options: of the machine: device, whether to resume, when to report; `max_steps` shortens every
+        options: of the machine: device, when to report; `max_steps` shortens every
             stage. What the recipe says goes before them.
 
     Raises:

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import torch
 
-from app.gl import SplatRenderer
+from app.gl import SplatRenderer, paints
 from app.gl.canvas import Canvas
 from app.gl.processor import still
 from app.gl.processor.still import StillMaps, draw_still
@@ -56,9 +56,16 @@ def test_a_renderer_shows_it_as_its_own(gl, scene, what: str) -> None:
     renderer.ask(question(scene, 2))
 
     def shown() -> np.ndarray:
-        picture = renderer.rgb_texture if what == "rgb" else None
-        many = {"weight": (3,)}.get(what, ())
-        return pixels(picture or getattr(renderer, f"{what}_texture")(*many))
+        paint = {
+            "rgb": lambda: renderer.rgb_texture,
+            "heat": renderer.heat_texture,
+            "label": renderer.label_texture,
+            "atom": renderer.picture().atoms,
+            "feature": renderer.picture().features,
+            "depth": lambda: paints.depth(renderer),
+            "weight": lambda: renderer.picture().weight(3, "turbo"),
+        }[what]
+        return pixels(paint())
 
     renderer.draw(SEEN)
     own = shown()

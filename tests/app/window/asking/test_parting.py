@@ -15,8 +15,9 @@ from app.window.asking.state import Part, Parts
 from app.window.asking.work import ListParts
 from app.window.editing import commands as edit
 from app.window.kit import theme
-from app.window.scene.commands import Merged, SceneArrived
+from app.window.scene.commands import SceneArrived
 from app.window.scene.mended import SplitPart
+from app.window.scene.merging import Merged
 from app.window.scene.work import WriteScene, describe_scene
 from app.window.state import State
 from langflash_core.geometry.poses import Vector

@@ -74,7 +74,10 @@ def test_the_preview_is_what_the_command_takes(shown: State, recipe: Recipe, sel
         shown = after(shown, edit.Found(within, "replace", "here"), edit.FindFloaters())
     fields = ("strength", "kinds", "rules", "within", "invert", "crop")
     state = worked(after(shown, clean.ChangeRecipe({name: getattr(recipe, name) for name in fields})))
-    wanted = cleaned(info.scene, recipe, within=None if within is None else within.rows()).rows
+    wanted = cleaned(info.scene, recipe).rows
+    if within is not None:  # a box holds everywhere
+        boxed = cleaned(info.scene, Recipe(crop=recipe.crop)).rows
+        wanted = cleaned(info.scene, replace(recipe, crop=None)).rows & within.rows() | boxed
     assert np.array_equal(going(state).rows(), wanted)
     assert selecting or 0 < wanted.sum() < COUNT
 

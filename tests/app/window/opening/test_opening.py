@@ -16,6 +16,7 @@ from app.window.opening.panels.welcome import working
 from app.window.opening.pasted import pasted_paths
 from app.window.opening.state import MOST_FILES, Folder
 from app.window.scene import commands as show
+from app.window.scene import merging
 from app.window.scene.drops import sort_drop
 from app.window.state import State
 from langflash_core.errors import LangFlashError
@@ -237,7 +238,7 @@ def test_the_desktops_own_dialog_is_asked_where_there_is_one(monkeypatch) -> Non
     desk.state = shown_scene()
     desk.perform(opening.OpenFiles(merging=True))
     desk.effects.tick(desk.state, 3.0)
-    assert desk.performed[-1] == show.MergeScene(Path("/p/c.langflash"))
+    assert desk.performed[-1] == merging.MergeScene(Path("/p/c.langflash"))
 
 
 def test_photos_stay_on_show_while_they_are_worked_on() -> None:

@@ -44,14 +44,6 @@ def test_an_empty_window_opens_photos_with_clicks_alone(display: str, home: Path
     program.leave()
 
 
-def test_a_sample_is_one_click(display: str) -> None:
-    program = Program(display)
-    program.click("##sample Toy")
-    state = program.until(lambda s: s["job"] is not None, "the reconstruction")
-    assert state["photos"] == ["toy_left.png", "toy_right.png"]
-    program.leave()
-
-
 def test_a_scene_that_was_open_lately_is_a_tile_that_opens_as_it_was_left(
     display: str, scene_file: Path, tmp_path: Path, monkeypatch
 ) -> None:

@@ -13,6 +13,7 @@ from app.window.editing.placing import Nudge
 from app.window.editing.state import Handle, Tool
 from app.window.opening import commands as opening
 from app.window.scene import commands as show
+from app.window.scene import merging
 from app.window.scene.state import SceneInfo
 from app.window.scene.work import JoinScenes, describe_scene
 from langflash_core.errors import InputError
@@ -50,9 +51,9 @@ def desk(info: SceneInfo) -> Desk:
     return desk
 
 
-def joined(desk: Desk, path: Path, serial: int) -> show.Merged:
+def joined(desk: Desk, path: Path, serial: int) -> merging.Merged:
     """What the worker makes of the request."""
-    desk.perform(show.MergeScene(path))
+    desk.perform(merging.MergeScene(path))
     request = desk.asked[-1]
     assert isinstance(request, JoinScenes)
     return request.run(serial, lambda *_: None, lambda: False)
@@ -152,7 +153,7 @@ def test_a_scene_dropped_on_a_scene_is_asked_about_and_an_opened_one_not(
     assert desk.state.dialog is None and desk.jobs == ["LoadScene"]  # nothing is there to merge into
     desk.perform(show.SceneArrived(info), show.OpenPaths((str(block),), dropped=True))
     assert desk.state.dialog is Dialog.DROP_SCENE and desk.jobs == ["LoadScene"]
-    desk.perform(show.MergeScene(desk.state.scene.dropped[0]))
+    desk.perform(merging.MergeScene(desk.state.scene.dropped[0]))
     assert desk.state.dialog is None and desk.jobs[-1] == "JoinScenes"
     desk.perform(show.OpenPaths((str(block),)))
     assert desk.jobs[-1] == "LoadScene"
@@ -160,7 +161,7 @@ def test_a_scene_dropped_on_a_scene_is_asked_about_and_an_opened_one_not(
 
 def test_without_a_scene_there_is_nothing_to_merge_into(block: Path) -> None:
     desk = Desk()
-    desk.perform(show.MergeScene(block))
-    assert desk.jobs == [] and desk.state.toasts[-1].text == show.NOTHING_TO_MERGE
+    desk.perform(merging.MergeScene(block))
+    assert desk.jobs == [] and desk.state.toasts[-1].text == merging.NOTHING_TO_MERGE
     desk.perform(opening.LookInto(dialog=Dialog.MERGE), do.ShowDialog(None))
     assert desk.state.dialog is None

@@ -42,23 +42,3 @@ def test_edits_outlive_a_drop_of_another_room(display: str, scene_file: Path, fo
     state = running.until(lambda s: s["deleted"] == 0 and s["undone"] == 2, "undo of what was done before")
     assert state["gl_errors"] == [] and not state["unsaved"]
     running.leave()
-
-
-def test_a_dropped_scene_is_merged_and_taken_back(display: str, scene_file: Path, folders: Path) -> None:
-    other = folders / "kitchen.langflash"
-    shutil.copy(scene_file, other)
-    running = Program(display, scene_file)
-    running.until(lambda s: s["scene"] == "room.langflash", "the scene")
-    running.at_rest()
-    running.client.drop(running.window, [other], MIDDLE)
-    running.click("Merge into this scene")
-    state = running.until(
-        lambda s: s["selected"] == 12_300 and s["job"] is None, "the kitchen beside the room"
-    )
-    assert state["scene"] == "room.langflash" and state["edits"] == ["Merge kitchen.langflash"]
-    assert state["tool"] == "PLACE" and state["unsaved"]
-    before = running.at_rest()["pose"]
-    running.xdotool("mousemove", *map(str, MIDDLE), "key", "ctrl+z")
-    state = running.until(lambda s: s["selected"] == 0 and s["undone"] == 1, "the room alone")
-    assert not state["unsaved"] and state["pose"] == before and state["gl_errors"] == []
-    running.leave()

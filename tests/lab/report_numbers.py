@@ -1,4 +1,4 @@
-"""Write the report's tables into the documents that show them: `python -m tests.report_numbers`.
+"""Write the report's tables into the documents that show them: `python -m tests.lab.report_numbers`.
 
 Afterwards every number between `<!-- report ... -->` and `<!-- end -->` is that of
 `assets/report/report.json`, which `langflash lab eval report ... --small assets/report` makes.
@@ -10,7 +10,7 @@ from pathlib import Path
 
 from langflash_core.lab.evaluation.report_small import filled
 
-ROOT = Path(__file__).resolve().parent.parent
+ROOT = Path(__file__).resolve().parents[2]
 SMALL = ROOT / "assets" / "report" / "report.json"
 DOCUMENTS = ("MEASURED.md",)
 

@@ -13,8 +13,8 @@ from langflash_core.lab.evaluation.ablations import study, tables
 from langflash_core.lab.evaluation.report_small import filled
 from langflash_core.lab.training.shards import write_shard
 from langflash_core.network import MINI, GuidedDepthNet, save_network
+from tests.lab.report_numbers import DOCUMENTS, ROOT
 from tests.lab.training.conftest import toy_record
-from tests.report_numbers import DOCUMENTS, ROOT
 
 
 @pytest.fixture

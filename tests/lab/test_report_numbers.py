@@ -5,7 +5,7 @@ import json
 import pytest
 
 from langflash_core.lab.evaluation.report_small import filled
-from tests.report_numbers import DOCUMENTS, SMALL, current
+from tests.lab.report_numbers import DOCUMENTS, SMALL, current
 
 TABLES = {
     "weights": "w",
@@ -24,7 +24,7 @@ TEXT = "before\n<!-- report rooms: Some -->\nold\n<!-- end -->\nafter\n"
 def test_tables_of_documents_are_those_of_the_report(name: str):
     text, expected = current(name)
     assert "<!-- report " in text, f"{name} marks no table"
-    assert text == expected, f"run python -m tests.report_numbers; {name} would be:\n{expected}"
+    assert text == expected, f"run python -m tests.lab.report_numbers; {name} would be:\n{expected}"
 
 
 def test_a_marked_table_is_replaced_and_nothing_else():
