@@ -160,7 +160,7 @@ def compile_query(
     factor, basis = reduce_dictionary(dictionary)
     vectors = encode_prompts(space, texts).to(basis)
     judged = vectors @ basis.T
-    if mode == "relevancy" and space.rivals:
+    if mode == "relevancy":
         judged = judged + _in_factor(factor, rivalled(dictionary, space, texts, vectors))
     return CompiledQuery(
         factor=factor,
@@ -181,7 +181,9 @@ def rivalled(
     texts: Sequence[str],
     phrases: Float[Tensor, "P C"],
 ) -> Float[Tensor, "K P"]:
-    """What rivals add to the products of atoms and phrases; texts: of the phrases."""
+    """What rivals add to products of atoms and phrases, which say `texts`; nothing in a space without."""
+    if not space.rivals:
+        return dictionary.new_zeros(len(dictionary), len(phrases))
     names = encode_cached(space, space.rivals).to(dictionary)
     kin = alike(texts, space.rivals).to(dictionary.device)
     return dictionary.norm(dim=-1, keepdim=True) * rivalry(dictionary, phrases, names, kin)

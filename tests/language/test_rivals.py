@@ -84,5 +84,8 @@ def test_names_of_the_same_thing_are_no_rivals():
 
 
 def test_nothing_has_no_rivals():
+    space = language_space()
+    added = rivalled(space.encode(["tv"]), replace(space, rivals=()), ["couch"], space.encode(["couch"]))
+    assert added.tolist() == [[0.0]]
     query = compile_query(semantics_of(torch.zeros(0, 384)), language_space(), ["tv"])
     assert query.prompts.shape == (1, 0)
