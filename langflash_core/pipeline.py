@@ -21,7 +21,7 @@ from langflash_core.language.answers import answer
 from langflash_core.language.minilm import load_minilm, shipped_files
 from langflash_core.language.narrowing import narrow_view
 from langflash_core.language.relevance import Mode, finite_dictionary, relevance_maps
-from langflash_core.language.spaces import language_space
+from langflash_core.language.spaces import encode_cached, language_space
 from langflash_core.language.spoken import compile_spoken
 from langflash_core.language.vocabulary import all_phrases
 from langflash_core.reconstruction.ahead import Ahead
@@ -272,7 +272,8 @@ def _page_phrases(
     from langflash_core.export.html import Phrases
     from langflash_core.meant import check_threshold
 
-    compiled = compile_spoken(scene, language_space(scene.semantics.space), list(texts))  # of heads alone
+    space = language_space(scene.semantics.space)
+    compiled = compile_spoken(scene, space, list(texts))  # of heads alone
     limit = compiled.threshold if threshold is None else threshold
     check_threshold(limit)
     atoms = compiled.factor  # of which D = atoms Q: products with phrases are the same
@@ -284,7 +285,8 @@ def _page_phrases(
         gram=atoms @ atoms.T,
         temperature=compiled.temperature,
         threshold=limit,
-        dictionary=finite_dictionary(scene, language_space("minilm")) if with_text else None,
+        dictionary=finite_dictionary(scene, space) if with_text else None,
+        rivals=encode_cached(space, space.rivals) if with_text else None,
     )
 
 

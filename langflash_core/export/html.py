@@ -71,8 +71,8 @@ class Phrases:
 
     texts: P phrases, the first `num_asked` of them shown at once. scores (P, K): d_k . t.
     negatives (M, K): d_k . n of what a phrase is compared with. gram (K, K): d_j . d_k.
-    temperature, threshold: as of a query in mode relevancy. dictionary (K, C): d_k, where phrases are to be
-    answered that are not among the texts.
+    temperature, threshold: as of a query in mode relevancy. dictionary (K, C): d_k, and rivals (V, C): names
+    that others are measured against, where phrases are to be answered that are not among the texts.
     """
 
     texts: tuple[str, ...]
@@ -83,6 +83,7 @@ class Phrases:
     temperature: float
     threshold: float
     dictionary: Tensor | None = None
+    rivals: Tensor | None = None
 
 
 @dataclass(frozen=True)
@@ -232,7 +233,7 @@ def _encoded(scene: Scene, phrases: Phrases | None) -> tuple[dict, bytes]:
         columns += weight_columns(held)
         tables = {
             "scores": phrases.scores, "negatives": phrases.negatives, "gram": phrases.gram,
-            "dictionary": phrases.dictionary,
+            "dictionary": phrases.dictionary, "rivals": phrases.rivals,
         }  # fmt: skip
         columns += [table_column(name, table, header) for name, table in tables.items() if table is not None]
     header["columns"] = [[c.name, c.values.size, c.width, c.differences] for c in columns]

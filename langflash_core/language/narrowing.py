@@ -28,6 +28,7 @@ _MOSTLY = (
     0.4  # of a thing's surface, from which on it is called by a look: the rest is shade and what lies on it
 )
 _HARDLY = 0.6  # of the look's best thing: less is another look
+_STANDS_OUT = 0.2  # of a thing's surface, from which on it is the one called so where all others have a third
 _MOST_COLOURFUL, _GREY = 0.98, 4.0  # quantile of chroma, and chroma: below, a picture is a grey one
 _CRUMB = 0.05  # of the share of the largest thing: the same chair four times as far away has 0.06
 _EVEN = 0.5  # relevancy of what fits no better than what it is compared with
@@ -100,7 +101,8 @@ Chosen = tuple[list[Thing], str]
 
 
 def _looking(things: list[Thing], modifier: Modifier, sight: Sight, head: str) -> Chosen:
-    """Things mostly called so; where none is, the parts of them that are."""
+    """Things mostly called so; where none is, the one that stands out, as an orange ladder in dim light does;
+    else the parts of them that are."""
     chroma = np.hypot(sight.colours[:, 1], sight.colours[:, 2])
     if LOOKS[modifier.word].hue and np.quantile(chroma, _MOST_COLOURFUL) < _GREY:
         return things, f"its picture has no colours, so nothing here can be told to be {modifier.word}"
@@ -108,9 +110,14 @@ def _looking(things: list[Thing], modifier: Modifier, sight: Sight, head: str) -
     shares = np.array([float(each.mean()) for each in well])
     if modifier.negated:
         return [each for each, share in zip(things, shares, strict=True) if share < _MOSTLY], ""
-    enough = max(_MOSTLY, _HARDLY * float(shares.max()))
-    if shares.max() >= enough:
+    most = max(each.share for each in things)
+    seen = [row for row, each in enumerate(things) if each.share >= _CRUMB * most]
+    *others, best = sorted(seen, key=lambda row: shares[row])
+    enough = max(_MOSTLY, _HARDLY * float(shares[best]))
+    if shares[best] >= enough:
         return [each for each, share in zip(things, shares, strict=True) if share >= enough], ""
+    if others and shares[best] >= max(_STANDS_OUT, 3 * shares[others].max()):
+        return [things[best]], ""
     members = np.zeros(len(sight.areas), bool)
     for each, own in zip(things, well, strict=True):
         members[each.rows[own >= 0.5]] = True

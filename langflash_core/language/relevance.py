@@ -5,7 +5,9 @@ formed. With the thin factorisation D = R Q, the rows of Q orthonormal,
 
     F = (W R) Q,   |F| = |W R|,   F . t = (W R) . (Q t),
 
-both exact. A compiled query holds R, Q t and Q n: nothing of it is wider than K.
+both exact. A compiled query holds R, Q t and Q n: nothing of it is wider than K. What rivals add to a phrase
+(`rivals.py`) is a number an atom, a_k. |d_k| a_k = (R x)_k has a solution where no atom is a mixture of
+others, and Q t + x is held.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -20,6 +22,7 @@ from langflash_core.errors import PromptError, SceneFileError
 from langflash_core.language.algebra import encode_prompts
 from langflash_core.language.grammar import Reading
 from langflash_core.language.hints import hints
+from langflash_core.language.rivals import alike, rivalry
 from langflash_core.language.spaces import LanguageSpace, encode_cached
 from langflash_core.language.taught import taught_dictionary
 from langflash_core.types import Scene, Semantics
@@ -29,6 +32,7 @@ Mode = Literal["relevancy", "cosine"]
 # Pixels with |F| below this are empty: just above the smallest normal float16 (6.1e-5), so that
 # half-precision weight maps, too, have a direction wherever relevance is not 0.
 EMPTY_NORM = 1e-4
+_SAME = 1e-6  # singular values, of the largest: atoms that differ by less, float32's rounding, are the same
 _PIXELS_AT_ONCE = 1 << 13  # 33 KB a phrase: 100 phrases stay in the cache, 2.6 times as quick as 1 << 16
 _ON_A_CARD = 1 << 18  # where starting work costs more than memory: 105 MB for 100 phrases
 
@@ -37,7 +41,7 @@ _ON_A_CARD = 1 << 18  # where starting work costs more than memory: 105 MB for 1
 class CompiledQuery:
     """P phrases made ready for one dictionary.
 
-    factor: R (K, r). prompts: Q t (P, r). negatives: Q n (M, r), M = 0 in cosine mode.
+    factor: R (K, r). prompts: Q t + x (P, r). negatives: Q n (M, r), M = 0 in cosine mode.
     temperature > 0. threshold: from which relevance a phrase counts as present. texts,
     negative_texts: the phrases. notes: what people should know of each, or "" (`hints.py`). readings: of
     phrases whose heads alone were compiled; none: they are asked as they stand. others: heads of the things
@@ -152,10 +156,15 @@ def compile_query(
     against = tuple(calibration.negatives if negatives is None else negatives) if mode == "relevancy" else ()
     if mode == "relevancy" and not against:
         raise PromptError("relevancy needs a negative phrase to compare with; name one, or use 'cosine'")
-    factor, basis = reduce_dictionary(spoken_dictionary(scene, space))
+    dictionary = finite_dictionary(scene, space)
+    factor, basis = reduce_dictionary(dictionary)
+    vectors = encode_prompts(space, texts).to(basis)
+    judged = vectors @ basis.T
+    if mode == "relevancy":
+        judged = judged + _in_factor(factor, rivalled(dictionary, space, texts, vectors))
     return CompiledQuery(
         factor=factor,
-        prompts=encode_prompts(space, texts).to(basis) @ basis.T,
+        prompts=judged,
         negatives=encode_cached(space, against).to(basis) @ basis.T,
         temperature=calibration.temperature,
         threshold=calibration.threshold if mode == "relevancy" else calibration.cosine_threshold,
@@ -164,6 +173,26 @@ def compile_query(
         negative_texts=against,
         notes=hints(scene, texts),
     )
+
+
+def rivalled(
+    dictionary: Float[Tensor, "K C"],
+    space: LanguageSpace,
+    texts: Sequence[str],
+    phrases: Float[Tensor, "P C"],
+) -> Float[Tensor, "K P"]:
+    """What rivals add to products of atoms and phrases, which say `texts`; nothing in a space without."""
+    if not space.rivals:
+        return dictionary.new_zeros(len(dictionary), len(phrases))
+    names = encode_cached(space, space.rivals).to(dictionary)
+    kin = alike(texts, space.rivals).to(dictionary.device)
+    return dictionary.norm(dim=-1, keepdim=True) * rivalry(dictionary, phrases, names, kin)
+
+
+def _in_factor(factor: Tensor, products: Tensor) -> Tensor:
+    """x (P, r) with R x = products (K, P), the shortest one; of more atoms than channels the nearest."""
+    inverse = torch.linalg.pinv(factor.detach().to("cpu", torch.float64), rtol=_SAME)
+    return (inverse @ products.to(inverse)).T.to(factor)
 
 
 def relevancy(

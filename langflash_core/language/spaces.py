@@ -10,6 +10,7 @@ from torch import Tensor
 
 from langflash_core.errors import PromptError
 from langflash_core.language import clip, minilm
+from langflash_core.language.vocabulary import OWN
 from langflash_core.types import NO_LANGUAGE
 
 # Kerr et al. 2023 (LERF), section 4.2.
@@ -29,7 +30,8 @@ class LanguageSpace:
     dimension: C. temperature: factor on cosines inside `relevancy`, > 0. negatives: phrases
     that a present thing must beat. threshold: relevancy in (0, 1) from which a phrase counts as
     present; cosine_threshold: the same for `cosine`, in [-1, 1]. A trained network's own
-    calibration, kept in the scene, goes before these defaults. load: gives the tower.
+    calibration, kept in the scene, goes before these defaults. load: gives the tower. rivals: names that
+    take from a phrase what fits them better (`rivals.py`); none: it stands for itself.
     """
 
     name: str
@@ -39,6 +41,7 @@ class LanguageSpace:
     cosine_threshold: float
     load: Callable[[], TextTower] = field(repr=False)
     negatives: tuple[str, ...] = NEGATIVES
+    rivals: tuple[str, ...] = ()
 
     def encode(self, texts: Sequence[str]) -> Float[Tensor, "P C"]:
         """Unit embeddings (P, C) float32; the tower is read at the first call.
@@ -68,6 +71,7 @@ _MINILM = LanguageSpace(
     threshold=0.8,
     cosine_threshold=0.5,
     load=minilm.load_minilm,
+    rivals=tuple(OWN),
 )
 # Temperature and the border of relevancy as LERF has them; cosines of LSeg features with their
 # own label lie around 0.2 to 0.3. Not calibrated here, for lack of CLIP weights.

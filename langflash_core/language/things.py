@@ -81,6 +81,12 @@ class Thing:
         low, high = np.quantile(angles, _ENDS)
         return float(low), float(high)
 
+    def away(self, first: float, last: float) -> float:
+        """How far what lies in some directions is; all of it where nothing does."""
+        angles = np.arctan2(self.points[:, RIGHT], self.points[:, AWAY])
+        there = self.points[(angles >= first) & (angles <= last)]
+        return float(np.median(there[:, AWAY])) if len(there) else float(self.middle[AWAY])
+
     @property
     def column(self) -> float:
         """Of its middle."""
@@ -209,10 +215,13 @@ def _right(thing: Thing, other: Thing) -> bool:
 
 
 def _before(thing: Thing, other: Thing) -> bool:
-    """Nearer to the viewer, and in the way to the other: their directions meet."""
-    common = min(thing.columns[1], other.columns[1]) - max(thing.columns[0], other.columns[0])
+    """In the way to the other: their directions meet, and there it is nearer to the viewer. A wall is as far
+    as it is behind the ladder, not as its middle is."""
+    ends = max(thing.columns[0], other.columns[0]), min(thing.columns[1], other.columns[1])
     narrower = min(each.columns[1] - each.columns[0] for each in (thing, other))
-    return common >= _MEETS * narrower and bool(thing.middle[AWAY] < other.middle[AWAY] - thing.touch / 2)
+    if ends[1] - ends[0] < _MEETS * narrower:
+        return False
+    return thing.away(*ends) < other.away(*ends) - thing.touch / 2
 
 
 def _between(thing: Thing, one: Thing, two: Thing) -> bool:

@@ -74,3 +74,18 @@ def softmax_relevancy(positives: Tensor, negatives: Tensor, temperature: float) 
         for negative in negatives
     ]
     return torch.stack(pairs).amin(0)
+
+
+def beaten_twin(
+    atom: NDArray[np.float64], phrase: NDArray[np.float64], names: NDArray[np.float64], constants: tuple
+) -> float:
+    """What rivals add to one atom's cosine with a phrase, name by name; constants: kin, behind, lead."""
+    kin, behind, lead = constants
+    length = math.sqrt(math.fsum(atom**2))
+    if length == 0:
+        return 0.0
+    ahead = 0.0
+    for name in names:
+        if math.fsum(phrase * name) <= kin:
+            ahead = max(ahead, math.fsum(atom * name) / length - math.fsum(atom * phrase) / length)
+    return lead - behind * ahead

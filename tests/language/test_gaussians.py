@@ -6,7 +6,7 @@ from torch.nn.functional import normalize
 
 from langflash_core.language import gaussians
 from langflash_core.language.gaussians import gaussian_relevance
-from langflash_core.language.relevance import compile_query
+from langflash_core.language.relevance import compile_query, rivalled
 from langflash_core.language.spaces import language_space
 from langflash_core.types import Gaussians, Scene, Semantics
 
@@ -39,15 +39,23 @@ def test_it_is_the_relevancy_of_each_feature(monkeypatch):
     dictionary = scene.semantics.dictionary.double().numpy()
     positives = space.encode(["chair", "floor"]).double().numpy()
     negatives = space.encode(compiled.negative_texts).double().numpy()
+    asked = ["chair", "floor"]
+    rivals = rivalled(scene.semantics.dictionary, space, asked, space.encode(asked)).double().numpy()
     for row in range(200):
-        pairs = zip(scene.semantics.weight_ids[row], scene.semantics.weight_values[row], strict=True)
-        feature = sum(float(value) * dictionary[int(k)] for k, value in pairs)
+        pairs = [
+            (int(k), float(value))
+            for k, value in zip(
+                scene.semantics.weight_ids[row], scene.semantics.weight_values[row], strict=True
+            )
+        ]
+        feature = sum(value * dictionary[k] for k, value in pairs)
         norm = np.linalg.norm(feature)
         for phrase in range(2):
             if norm == 0:
                 assert found[phrase, row] == 0
                 continue
-            ours, others = positives[phrase] @ feature / norm, negatives @ feature / norm
+            beaten = sum(value * rivals[k, phrase] for k, value in pairs)
+            ours, others = min((positives[phrase] @ feature + beaten) / norm, 1.0), negatives @ feature / norm
             softmax = np.exp(compiled.temperature * ours)
             least = min(softmax / (softmax + np.exp(compiled.temperature * other)) for other in others)
             # float32 cosines are good to 1e-6, and relevancy moves by a quarter of temperature times that.

@@ -7,7 +7,8 @@ import pytest
 import torch
 
 from langflash_core import pipeline
-from langflash_core.language.narrowing import viewer_axes
+from langflash_core.language.grammar import read
+from langflash_core.language.narrowing import Sight, choose, viewer_axes
 from langflash_core.types import Scene
 from tests.boxroom import box_room
 
@@ -122,6 +123,38 @@ def test_a_grey_picture_tells_no_colours() -> None:
     scene = replace(scene, gaussians=replace(scene.gaussians, sh=grey))
     (answer,) = pipeline.query(scene, "red chair", size=SIZE).answers
     assert answer.found and "has no colours" in answer.note
+
+
+def two_ladders(orange: float, elsewhere: float) -> Sight:
+    """A small ladder and a large one, whose pixels are orange in these shares and else grey, and a crumb that
+    is orange."""
+    numbers = np.repeat([0, 1, 2], (200, 1000, 20))
+    shares = np.array([orange, elsewhere, 1.0])[numbers]
+    places = np.concatenate([np.linspace(0, 1, count, endpoint=False) for count in (200, 1000, 20)])
+    colours = np.where((places < shares)[:, None], (60.0, 30.0, 45.0), (60.0, 0.0, 0.0))
+    return Sight(
+        points=np.random.default_rng(0).normal(numbers[:, None], 0.1, (len(numbers), 3)),
+        colours=colours,
+        areas=np.full(len(numbers), 1 / len(numbers)),
+        relevance={"ladder": np.ones(len(numbers))},
+        limit=0.9,
+        likely=0.8,
+        parts=lambda members: np.where(members, numbers, -1),
+    )
+
+
+@pytest.mark.parametrize(
+    ("orange", "elsewhere", "sizes"),
+    [
+        (0.25, 0.05, [200]),  # it stands out, whole
+        (0.25, 0.15, [50, 150, 20]),  # none does: what is orange of each
+        (0.6, 0.05, [200, 20]),  # mostly orange, with the crumb that is, too
+        (0.1, 0.0, [20, 20]),
+    ],
+)
+def test_the_one_that_stands_out_is_meant(orange: float, elsewhere: float, sizes: list[int]) -> None:
+    kept = choose(read("orange ladder"), two_ladders(orange, elsewhere)).kept
+    assert [len(each.rows) for each in kept] == sizes
 
 
 def test_by_cosine_too(ask) -> None:

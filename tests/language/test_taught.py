@@ -73,7 +73,8 @@ def test_a_group_that_is_said_not_to_be_a_word_does_not_answer_it_even_where_neg
     chair, wall = SPACE.encode(["armchair", "wall"])
     aside = normalize(SPACE.encode(list(SPACE.negatives)).sum(0), dim=0)
     group = normalize(chair - (chair @ aside) * aside - 0.02 * aside, dim=0)
-    other = normalize(0.8 * group + 0.6 * wall, dim=0)  # too little alike to go along
+    own = SPACE.encode(["lamp"])[0]  # what rivals add to an atom is exact where none is a mixture of others
+    other = normalize(0.8 * group + 0.6 * wall + 0.3 * own, dim=0)  # too little alike to go along
     scene = room(torch.stack((group, wall, other)))
     said = taught(scene, atom_denials={0: ("armchair",)})
     before, after = score(scene, "armchair"), score(said, "armchair")

@@ -32,7 +32,12 @@ PICTURE = box((-0.4, 0.4), (0, 0.6), (4.95, 4.98))
 CABINET = box((-1, 1), (-1.5, -0.6), (4.5, 5))
 SOFA = box((-2.5, -1.0), (-1.5, -0.7), (1.8, 2.6))
 CUSHION = box((-2.4, -2.0), (-0.75, -0.4), (2.2, 2.5))
+LADDER = box((-0.3, 0.3), (-1.5, 0.5), (4.7, 4.9))
+SIDE = box((2, 2), (-1.5, 1.1), (0.5, 5))
+WALLS = Thing(np.concatenate((SIDE.rows, WALL.rows)), np.concatenate((SIDE.places, WALL.places)))
 TRUE = [
+    (WALLS, "behind", LADDER),  # although its middle is nearer
+    (LADDER, "in front of", WALLS),
     (CUP, "on", TABLE),
     (TABLE, "on", FLOOR),
     (CHAIR, "on", FLOOR),

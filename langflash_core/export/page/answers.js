@@ -1,14 +1,25 @@
-// What Gaussians say to phrases, and whether a picture answers one. Twins: app/gl/fast.py and
-// langflash_core/language/answers.py, whose constants these are.
+// What Gaussians say to phrases, and whether a picture answers one. Twins: app/gl/fast.py,
+// langflash_core/language/rivals.py and answers.py, whose constants these are.
 
 const EMPTY_NORM = 1e-4; // |F| of pixels that say nothing
 const COVERED_ALPHA = 0.5; // from here on a pixel shows the scene
 const TOP_FRACTION = 0.001; // of the covered pixels: their mean is the score
 const MIN_AREA = 0.0005; // of all pixels: a smaller mask is noise
 const BINS = 4096;
+const KIN = 0.6; // cosine of names that mean the same
+const BEHIND = 0.4; // of how much a phrase is behind the best other name, what it loses
+const LEAD = 0.09; // what one gets that nothing beats
+
+// rows of a flat table (rows, C) times a vector (C,).
+function products(table, vector) {
+  return Float32Array.from({ length: table.length / vector.length }, (_, row) => {
+    return vector.reduce((sum, value, c) => sum + value * table[row * vector.length + c], 0);
+  });
+}
 
 class Answers {
-  // phrases: of readPhrases: P scores and M negatives of K numbers each; gram (K, K) and dictionary (K, C), flat.
+  // phrases: of readPhrases: P scores and M negatives of K numbers each; gram (K, K), dictionary (K, C) and
+  // rivals (V, C), flat.
   constructor(phrases, count) {
     Object.assign(this, phrases);
     this.count = count;
@@ -22,12 +33,25 @@ class Answers {
 
   // Take in a phrase by its unit vector (C,); its row.
   learn(text, vector) {
-    const channels = vector.length;
-    const scores = new Float32Array(this.atoms).map((_, atom) => {
-      return vector.reduce((sum, value, c) => sum + value * this.dictionary[atom * channels + c], 0);
+    const kin = products(this.rivals, vector).map((cosine) => cosine > KIN);
+    const scores = products(this.dictionary, vector).map((score, atom) => {
+      const length = Math.sqrt(this.gram[atom * (this.atoms + 1)]);
+      const best = this.named(atom, vector.length).reduce(
+        (most, value, name) => (kin[name] ? most : Math.max(most, value)),
+        -length,
+      );
+      return score + LEAD * length - BEHIND * Math.max(0, best - score);
     });
     this.scores.push(scores);
     return this.texts.push(text) - 1;
+  }
+
+  // d_k . n (V,) of an atom and the names that rival phrases.
+  named(atom, channels) {
+    this.names ??= Array.from({ length: this.atoms }, (_, k) => {
+      return products(this.rivals, this.dictionary.subarray(k * channels, (k + 1) * channels));
+    });
+    return this.names[atom];
   }
 
   // sum_k w_ik a_k (count,) of scores a (K,).

@@ -102,5 +102,6 @@ function readPhrases(header, columns) {
     negatives: rows(numbers("negatives")),
     gram: numbers("gram"),
     dictionary: columns.dictionary ? numbers("dictionary") : null,
+    rivals: columns.rivals ? numbers("rivals") : null,
   };
 }

@@ -6,7 +6,7 @@ const FLOOR = 0.05; // median distances and radians, together, within which no p
 const PLACE_STEPS = [32, 32, 4000]; // of a pixel across and down, of the logarithm of depth
 const PHRASES_OF_LAYERS = 3 * (MOST_LAYERS - 1) - 1; // a pass: one layer of its numbers is the place
 const SAMPLED = 16; // Gaussians of which one tells how large the scene is
-const OF_ALL = ["palette", "scores", "negatives", "gram", "dictionary"]; // columns with no row a Gaussian
+const OF_ALL = ["palette", "scores", "negatives", "gram", "dictionary", "rivals"]; // columns with no row a Gaussian
 
 // [{place, weight}] of the layers that a camera sees, the nearest first, in sum 1. photos: {eye, turn} of each.
 function chosenLayers(photos, distance, { eye, turn }) {

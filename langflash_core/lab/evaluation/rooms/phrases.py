@@ -13,7 +13,7 @@ from langflash_core.lab.training.measures import (
 )
 from langflash_core.lab.training.shards import RoomRecord
 from langflash_core.language.answers import presence_scores
-from langflash_core.language.relevance import relevancy
+from langflash_core.language.relevance import EMPTY_NORM, relevancy, rivalled
 from langflash_core.language.spaces import encode_cached
 from langflash_core.language.vocabulary import OWN
 from langflash_core.types import Prediction
@@ -39,11 +39,13 @@ def ask_phrases(
     if not present:
         return
     asked = [p for p in (*present, *absent) if p in setting.groups]
-    vectors = setting.texts[[setting.groups.index(p) for p in asked]]
-    if varied:
-        vectors = setting.space.encode([_other_word(p, i) if i % 2 else p for i, p in enumerate(asked)])
-    features = F.normalize(torch.einsum("khw,kc->hwc", prediction.weights[0], prediction.dictionary), dim=-1)
-    positives = torch.einsum("hwc,pc->phw", features, vectors)
+    words = [_other_word(p, i) if varied and i % 2 else p for i, p in enumerate(asked)]
+    vectors = setting.space.encode(words)
+    mixed = torch.einsum("khw,kc->hwc", prediction.weights[0], prediction.dictionary)
+    features, norms = F.normalize(mixed, dim=-1), mixed.norm(dim=-1).clamp_min(EMPTY_NORM)
+    beaten = rivalled(prediction.dictionary, setting.space, words, vectors)
+    added = torch.einsum("khw,kp->phw", prediction.weights[0], beaten) / norms
+    positives = (torch.einsum("hwc,pc->phw", features, vectors) + added).clamp(-1, 1)
     negatives = torch.einsum("hwc,mc->mhw", features, setting.negatives)
     maps = relevancy(positives, negatives, setting.temperature)
     covered = torch.ones(maps.shape[-2:], dtype=torch.bool)

@@ -1,0 +1,54 @@
+"""What a phrase loses where another name fits better. K atoms, P phrases, V names, C channels.
+
+Whatever is near a thing's own name scores, too: a kitchen without one has .84 of a "tv". So beside its cosine
+c_kp with an atom a phrase gets
+
+    LEAD - BEHIND max(0, max_v c_kv - c_kp),
+
+over names v of household things that mean something else. That is a number an atom and phrase, so that a
+pixel costs what it did. Own; twin `beaten_twin`.
+"""
+
+from collections.abc import Sequence
+
+import torch
+from jaxtyping import Bool, Float
+from torch import Tensor
+from torch.nn.functional import normalize
+
+from langflash_core.language.vocabulary import groups_of
+
+KIN = 0.6
+"""Cosine of texts from which they mean the same: "couch" and "sofa" have .86, "lamp" and "ceiling" .46."""
+BEHIND = 0.4
+"""Of how much a phrase is behind the best other name, what it loses; .3 to .5 are as good on photos."""
+LEAD = 0.09
+"""Cosine that a phrase gets which nothing beats: so the threshold of scores without rivals stays."""
+
+
+def rivalry(
+    atoms: Float[Tensor, "K C"],
+    phrases: Float[Tensor, "P C"],
+    names: Float[Tensor, "V C"],
+    alike: Bool[Tensor, "P V"] | None = None,
+) -> Float[Tensor, "K P"]:
+    """What to add to the cosine of every atom and phrase; 0 of atoms of length 0.
+
+    Args:
+        atoms: any length. phrases, names: unit rows. alike: names that mean what a phrase means, beside those
+            whose cosine says so.
+    """
+    units = normalize(atoms, dim=-1)
+    own, others = units @ phrases.T, units @ names.T  # (K, P), (K, V)
+    kin = phrases @ names.T > KIN
+    kin = kin if alike is None else kin | alike
+    best = torch.stack([others.masked_fill(each, -1.0).amax(1) for each in kin], 1)
+    added = LEAD - BEHIND * (best - own).clamp_min(0)
+    return torch.where(atoms.norm(dim=-1, keepdim=True) > 0, added, 0.0)
+
+
+def alike(texts: Sequence[str], names: Sequence[str]) -> Bool[Tensor, "P V"]:
+    """Whether the table of household words knows a phrase as one for a name: "painting" and "picture" have a
+    cosine of .4."""
+    groups = [groups_of(text) for text in texts]
+    return torch.tensor([[name in own for name in names] for own in groups])
