@@ -113,7 +113,7 @@ def test_what_another_photo_shows_is_said(run, tmp_path):
     assert outcome.out.startswith("not found  armchair")
     assert "warning: 'armchair' is not in photo 1, but photo 2 shows it; add --view 2\n" in outcome.err
     assert "'submarine' is not in photo 1" not in outcome.err
-    assert "photo 2 shows it" not in run("query", path, "armchair", "--view", 1, *TORCH).err  # asked of that one
+    assert "photo 2" not in run("query", path, "armchair", "--view", 1, *TORCH).err  # asked of that one
 
 
 def test_query_without_a_folder_writes_nothing(run, scene_file, tmp_path, monkeypatch):
