@@ -1,4 +1,4 @@
-"""What is deeper than any one thing, taken apart where its borders are.
+"""Pieces that are deeper than any one thing, taken apart where their borders are.
 
 Things in a row that answer one name touch, and come as one piece: two counters and the cupboards behind
 them. Such a piece is cut along the tree of regions that a click goes through

@@ -1,4 +1,4 @@
-"""What is deeper than any thing is taken apart."""
+"""Pieces that are deeper than any thing are taken apart."""
 
 from dataclasses import replace
 

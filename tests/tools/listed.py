@@ -1,4 +1,4 @@
-"""What the inventory lists of three real rooms, beside what a person sees standing there.
+"""The inventory of three real rooms, beside what a person sees standing there.
 
     python -m tests.tools.listed kitchen=SCENE workshop=SCENE office=SCENE
 
@@ -159,7 +159,7 @@ def _in_view(place: np.ndarray, photo: list[int], view: tuple[int, int]) -> np.n
 
 
 def judge(found: Inventory, room: tuple[tuple[str, Points], ...]) -> Verdict:
-    """What is right of a list, and what cannot be."""
+    """A list beside what stands there: right things, and those that cannot be."""
     frames = {Path(name).stem for name in found.given.record.photos}
     there = [(names.split(", "), points) for names, points in room if frames & set(points)]
     at = [covered(found, points) for _, points in there]

@@ -97,7 +97,9 @@ def test_what_is_doubted_is_drawn_so_and_says_why():
     drawn = plan_svg(doubted, "Room").partition("</style>")[2]
     assert "Perhaps no wall: it is short" in drawn and drawn.count('class="doubt"') == 1
     assert "table 1: it goes through a wall" in drawn and ">table 1?<" in drawn
-    assert "dashed: perhaps no wall; grey, ?: in doubt" in drawn
+    assert ">dashed: perhaps no wall; grey, ?: in doubt<" in drawn
+    told = plan_svg(replace(doubted, eyes=((0.0, 0.0),)), "Room")  # in one line, for none to lie on another
+    assert ">where the photos were taken; dashed: perhaps no wall; grey, ?: in doubt<" in told
     assert "DOUBTED\n10\n" in plan_dxf(doubted)
 
 

@@ -235,17 +235,13 @@ def _bar(paper: _Paper, plan: Plan, y: float) -> str:
 
 
 def _stood(plan: Plan, y: float) -> str:
-    """What the dots are, and what is doubted."""
-    doubted = any(wall.doubt for wall in plan.walls)
-    grey = any(doubt_of(thing, plan) for thing in plan.things)
-    said = ["dashed: perhaps no wall"] * doubted + ["grey, ?: in doubt"] * grey
-    note = f'<text class="note" x="{_EDGE + 38}" y="{y + 0.9:.2f}">{"; ".join(said)}</text>' if said else ""
-    if not plan.eyes:
-        return note
-    return note + (
-        f'<circle class="eye" cx="{_EDGE + 0.7}" cy="{y:.2f}" r=".7"/>'
-        f'<text class="note" x="{_EDGE + 2.5}" y="{y + 0.9:.2f}">where the photos were taken</text>'
-    )
+    """What the dots are, and how what is doubted is drawn."""
+    said = ["where the photos were taken"] * bool(plan.eyes)
+    said += ["dashed: perhaps no wall"] * any(wall.doubt for wall in plan.walls)
+    said += ["grey, ?: in doubt"] * any(doubt_of(thing, plan) for thing in plan.things)
+    dot = f'<circle class="eye" cx="{_EDGE + 0.7}" cy="{y:.2f}" r=".7"/>' if plan.eyes else ""
+    x = _EDGE + (2.5 if plan.eyes else 0.0)
+    return dot + f'<text class="note" x="{x}" y="{y + 0.9:.2f}">{"; ".join(said)}</text>' if said else ""
 
 
 def _arrow(x: float, y: float) -> str:
