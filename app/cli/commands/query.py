@@ -16,6 +16,7 @@ from ..survey import run_survey
 from ..vocabulary import taught_by
 
 if TYPE_CHECKING:
+    from langflash_core.language.relevance import Mode
     from langflash_core.types import Camera, Frame, QueryResult, Scene
 
 
@@ -65,7 +66,7 @@ def _one_scene(
         notes = [answer.note for answer in result.answers if answer.note]
         if args.view is None and args.camera is None:
             progress("looking in the other photos", 0.6)
-            notes += _elsewhere(scene, result, negatives, renderer)
+            notes += _elsewhere(scene, result, args.mode, negatives, renderer)
         progress("writing", 0.8)
         files = [{} for _ in result.answers] if args.output is None else _written(args, result)
     number = None if choice.view is None else choice.view + 1  # as people count
@@ -81,6 +82,7 @@ def _one_scene(
 def _elsewhere(
     scene: "Scene",
     result: "QueryResult",
+    mode: "Mode",
     negatives: list[str] | None,
     render: Callable[["Scene", "Camera"], "Frame"],
 ) -> list[str]:
@@ -94,22 +96,17 @@ def _elsewhere(
     missed = [answer.prompt for answer in result.answers if not answer.found]
     if not missed or scene.view_ids is None or scene.num_views < 2:
         return []
-    space, mode = language_space(scene.semantics.space), result.mode
+    space = language_space(scene.semantics.space)
     compiled = compile_spoken(scene, space, missed, negatives=negatives, mode=mode)
-    told = []
-    for prompt, hits in zip(
-        missed, gaussian_relevance(scene.semantics, compiled) >= compiled.threshold, strict=True
-    ):
+    told, answering = [], gaussian_relevance(scene.semantics, compiled) >= compiled.threshold
+    for prompt, hits in zip(missed, answering, strict=True):
         counts = scene.view_ids[hits].long().bincount(minlength=scene.num_views)
         view = int(counts.argmax())
         if view and counts[view]:
-            (answer,) = pipeline.query(
-                scene, [prompt], view=view, mode=mode, negatives=negatives, render=render
-            ).answers
-            if answer.found:
-                told.append(
-                    f"{prompt!r} is not in photo 1, but photo {view + 1} shows it; add --view {view + 1}"
-                )
+            seen = pipeline.query(scene, [prompt], view=view, mode=mode, negatives=negatives, render=render)
+            if seen.answers[0].found:
+                said = f"{prompt!r} is not in photo 1, but photo {view + 1} shows it"
+                told.append(f"{said}; add --view {view + 1}")
     return told
 
 
