@@ -24,6 +24,7 @@ from torch import Tensor
 from langflash_core.base.records import Guess, World
 from langflash_core.errors import InputError
 from langflash_core.export import opened
+from langflash_core.inventory.apart import DEEPEST, taken_apart
 from langflash_core.inventory.pieces import STRUCTURE, Parts, parts_of_room
 from langflash_core.language.answers import BOX_QUANTILES
 from langflash_core.language.gaussians import gaussian_relevance
@@ -31,6 +32,7 @@ from langflash_core.language.relevance import compile_query
 from langflash_core.language.spaces import language_space
 from langflash_core.language.vocabulary import OWN
 from langflash_core.level import found_world, metres_of
+from langflash_core.scene.regions import regions_of
 from langflash_core.scene.thin import covered_areas
 from langflash_core.scene.world import turn_of
 from langflash_core.segments import evenly, photo_shares
@@ -190,6 +192,7 @@ def inventory(
     shares = photo_shares(scene).numpy()
     parts = parts_of_room(scene, shares.sum(0, dtype=float))
     whole = Inventory(scene, given, surface, world, unit, scale, guess, shares, parts)
+    whole = replace(whole, parts=_no_deeper(whole, least))
     return replace(whole, things=_things(whole, threshold, least))
 
 
@@ -208,9 +211,8 @@ def unlisted(whole: Inventory, rows: Integer[np.ndarray, " n"], others: Sequence
     scene, names = whole.scene, [name for name in OWN if name not in (*STRUCTURE, *OPENINGS)]
     areas, seen = covered_areas(scene.gaussians), whole.shares[:, rows].sum(1)
     space, some = language_space(scene.semantics.space), scene.semantics.rows(torch.from_numpy(rows))
-    cosines = gaussian_relevance(some, compile_query(scene, space, names, mode="cosine"))
-    weights = torch.from_numpy(areas[rows] + 1e-12).to(cosines)
-    kind = names[int((cosines @ weights).argmax())]
+    weights = torch.from_numpy(areas[rows] + 1e-12)
+    kind, _ = _called(scene, rows, weights.numpy(), names)
     relevance = gaussian_relevance(some, compile_query(scene, space, [kind]))[0]
     sure = float(relevance @ weights.to(relevance) / weights.sum())
     taken = {thing.id for thing in (*whole.things, *others)}
@@ -261,6 +263,42 @@ def _things(whole: Inventory, threshold: float | None, least: float) -> tuple[Th
     return tuple(sorted(things, key=lambda thing: -max(thing.shares)))
 
 
+def _no_deeper(whole: Inventory, least: float) -> Parts:
+    """The parts; those that are deeper than any thing in as many as stand there."""
+    parts, areas, masses = whole.parts, covered_areas(whole.scene.gaussians), whole.shares.sum(0)
+    numbers, kinds, cosines = parts.numbers.copy(), [*parts.kinds], [*parts.cosines]
+
+    def fits(rows: Integer[np.ndarray, " n"]) -> bool:
+        return _box(whole, rows, areas)[1][1] <= DEEPEST * whole.metre
+
+    shown = _sums(numbers, whole.shares, len(kinds)).max(0)
+    large = [n for n, kind in enumerate(kinds) if kind not in (*STRUCTURE, *OPENINGS) and shown[n] >= least]
+    deep = [own for own in (np.flatnonzero(numbers == number) for number in large) if not fits(own)]
+    if not deep:
+        return parts
+    tree = regions_of(whole.given)
+    leaves = tree.leaves if whole.surface is None else tree.leaves[whole.surface.numpy()]
+    for own in deep:
+        told = taken_apart(tree, leaves[own], masses[own], least, lambda rows, own=own: fits(own[rows]))
+        numbers[own] = np.where(told < 0, -1, len(kinds) + told)
+        for number in range(int(told.max(initial=-1)) + 1):
+            rows = own[told == number]
+            kind, cosine = _called(whole.scene, rows, masses[rows], tuple(OWN))
+            kinds.append(kind)
+            cosines.append(cosine)
+    return Parts(numbers, tuple(kinds), tuple(cosines), parts.present)
+
+
+def _called(
+    scene: Scene, rows: Integer[np.ndarray, " n"], weights: Float[np.ndarray, " n"], names: Sequence[str]
+) -> tuple[str, float]:
+    """Which of some kinds rows of a scene answer best, and their mean cosine with it."""
+    compiled = compile_query(scene, language_space(scene.semantics.space), names, mode="cosine")
+    cosines = gaussian_relevance(scene.semantics.rows(torch.from_numpy(rows)), compiled).numpy()
+    means = cosines @ (weights / weights.sum())
+    return names[int(means.argmax())], float(means.max())
+
+
 def _sums(numbers: np.ndarray, shares: np.ndarray, count: int) -> np.ndarray:
     """(V, count) of the photos that each part fills."""
     some = numbers >= 0
@@ -276,9 +314,16 @@ def _thing(
     rows[own] = True
     return Thing(
         id, kind, whole.scene.record.thing_names.get(id, ""), sure,
-        *upright_box(whole.stands[own[evenly(areas[own])]]),
+        *_box(whole, own, areas),
         tuple(order), tuple(float(seen[view]) for view in order), _cut(whole, rows, order), rows,
     )  # fmt: skip
+
+
+def _box(
+    whole: Inventory, own: np.ndarray, areas: np.ndarray
+) -> tuple[tuple[float, float, float], tuple[float, float, float], float, float]:
+    """`upright_box` of some rows of the scene."""
+    return upright_box(whole.stands[own[evenly(areas[own])]])
 
 
 def upright_box(

@@ -8,9 +8,10 @@ import pytest
 import torch
 
 from langflash_core.inventory import inventory
-from langflash_core.inventory.plan import floor_plan, weighted_quantile
+from langflash_core.inventory.plan import _doubt, floor_plan, goes_through, weighted_quantile
 from langflash_core.scene.world import turn_of
-from tests.boxroom import DEEP, EYE, METRES, WIDE, box_room
+from tests.boxroom import DEEP, EYE, METRES, TABLE, WIDE, box_room
+from tests.inventory.test_things import with_more
 
 
 @pytest.fixture(scope="module")
@@ -64,6 +65,37 @@ def test_a_wall_is_where_its_near_half_is():
     walls = floor_plan(inventory(bent)).walls
     west = min((wall.start[0] + wall.end[0]) / 2 for wall in walls) + EYE[0]
     assert west == pytest.approx(0, abs=0.02)
+
+
+def screen(north: float, width: float) -> np.ndarray:
+    """Places (n, 3) of a wall of that width in the room's middle, along east and up."""
+    east, height = np.meshgrid(np.arange(0, width, 0.05), np.arange(0, 2.6, 0.05))
+    return np.stack((2 - width / 2 + east.ravel(), height.ravel(), np.full(east.size, north)), 1)
+
+
+def test_a_short_wall_is_doubted_and_none_where_a_thing_stands_across_it(plan):
+    assert not any(wall.doubt for wall in plan.walls) and not plan.astray
+    room = box_room().with_record(metric_scale=METRES)
+    beside = floor_plan(inventory(with_more(room, screen(2.2, 0.9), "wall")))
+    assert [wall.doubt for wall in beside.walls if wall.length < 1.2] == ["it is short"]
+    across = floor_plan(inventory(with_more(room, screen(TABLE[1], 0.9), "wall")))
+    assert len(across.walls) == 3 and not across.astray
+
+
+def test_a_small_wall_high_up_is_doubted():
+    assert _doubt(3.0, 0.5, 0.05) == "no photo shows it down to the floor"
+    assert not _doubt(3.0, 0.5, 0.5) and not _doubt(3.0, 0.1, 0.05) and _doubt(1.0, 0.1, 0.5)
+
+
+def test_what_stands_across_a_wall_goes_through_it(plan):
+    (table,) = (thing for thing in plan.things if thing.kind == "table")
+    east, _, north = table.place
+    wall = replace(plan.walls[0], start=(east - 1, north), end=(east + 1, north))
+    assert goes_through(table, wall, 1.0)
+    assert not goes_through(
+        table, replace(wall, start=(east - 1, north + 0.2), end=(east + 1, north + 0.2)), 1.0
+    )
+    assert not goes_through(table, replace(wall, start=(east + 0.1, north), end=(east + 2, north)), 1.0)
 
 
 def test_quantiles_by_weight_are_those_of_repeated_values():

@@ -6,13 +6,18 @@ import json
 import math
 import re
 import xml.etree.ElementTree as ET
+from dataclasses import replace
 
 import pytest
 
 from langflash_core.base.request import ExportRequest
 from langflash_core.export.png import to_8bit
+from langflash_core.inventory import inventory
+from langflash_core.inventory.plan import floor_plan
 from langflash_core.splat import render
 from langflash_core.writing import write
+from langflash_core.writing.inventory.drawing import plan_svg
+from langflash_core.writing.inventory.dxf import plan_dxf
 from tests.boxroom import DEEP, METRES, WIDE, box_room
 
 SVG = "{http://www.w3.org/2000/svg}"
@@ -20,8 +25,6 @@ SVG = "{http://www.w3.org/2000/svg}"
 
 def with_photos(scene):
     """The scene with what its cameras see for photos."""
-    from dataclasses import replace
-
     from PIL import Image
 
     jpegs = []
@@ -84,6 +87,20 @@ def test_the_plan_is_to_scale_on_paper(folder):
         if mark.get("class") == "badge"
     ]
     assert min(math.dist(a, b) for k, a in enumerate(badges) for b in badges[:k]) > 3  # none covers another
+
+
+def test_what_is_doubted_is_drawn_so_and_says_why():
+    plan = floor_plan(inventory(box_room().with_record(metric_scale=METRES)))
+    assert "oubt" not in plan_svg(plan, "Room").partition("</style>")[2]
+    wall = replace(plan.walls[0], doubt="it is short")
+    doubted = replace(plan, walls=(wall, *plan.walls[1:]), astray=frozenset({"table 1"}))
+    drawn = plan_svg(doubted, "Room").partition("</style>")[2]
+    assert "Perhaps no wall: it is short" in drawn and drawn.count('class="doubt"') == 1
+    assert "table 1: it goes through a wall" in drawn and ">table 1?<" in drawn
+    assert ">dashed: perhaps no wall; grey, ?: in doubt<" in drawn
+    told = plan_svg(replace(doubted, eyes=((0.0, 0.0),)), "Room")  # in one line, for none to lie on another
+    assert ">where the photos were taken; dashed: perhaps no wall; grey, ?: in doubt<" in told
+    assert "DOUBTED\n10\n" in plan_dxf(doubted)
 
 
 def test_the_plan_for_cad_has_every_wall_and_thing_on_its_layer(folder):

@@ -108,11 +108,11 @@ def _renamed(scene: "Scene", found: "Inventory", names: dict[str, str]) -> "Scen
 
 def _lines(found: "Inventory") -> list[str]:
     """A line a thing, under its headings."""
-    from langflash_core.writing.inventory.words import SURE, scale_note, size
+    from langflash_core.writing.inventory.words import doubt_of, scale_note, size
 
     rows = [("what", f"width × depth × height, {found.unit}", "sure", "photos")]
     for thing in found.things:
-        name = thing.title + (f" ({thing.id})" if thing.name else "") + ("" if thing.sure >= SURE else "?")
+        name = thing.title + (f" ({thing.id})" if thing.name else "") + ("?" if doubt_of(thing) else "")
         photos = ", ".join(str(view + 1) for view in thing.photos)
         measured = size(thing, "").strip() + (" and more" if thing.cut else "")
         rows.append((name, measured, f"{thing.sure:.0%}", photos))
@@ -120,7 +120,8 @@ def _lines(found: "Inventory") -> list[str]:
     lines = [
         "  ".join(f"{cell:{width}}" for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows
     ]
-    return [*lines, scale_note(found.guess, found.unit)]
+    doubted = ["?: it may be something else."] * any(doubt_of(thing) for thing in found.things)
+    return [*lines, *doubted, scale_note(found.guess, found.unit)]
 
 
 def _changes(changed: "Difference") -> list[str]:

@@ -1,6 +1,7 @@
 """`langflash query`: heat-maps, masks and numbers for phrases."""
 
 from argparse import Namespace
+from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO
 
@@ -15,7 +16,8 @@ from ..survey import run_survey
 from ..vocabulary import taught_by
 
 if TYPE_CHECKING:
-    from langflash_core.types import QueryResult
+    from langflash_core.language.relevance import Mode
+    from langflash_core.types import Camera, Frame, QueryResult, Scene
 
 
 def run(args: Namespace, out: TextIO) -> None:
@@ -61,16 +63,51 @@ def _one_scene(
         result = pipeline.query(
             scene, prompts, camera=camera, mode=args.mode, negatives=negatives, render=renderer
         )
+        notes = [answer.note for answer in result.answers if answer.note]
+        if args.view is None and args.camera is None:
+            progress("looking in the other photos", 0.6)
+            notes += _elsewhere(scene, result, args.mode, negatives, renderer)
         progress("writing", 0.8)
         files = [{} for _ in result.answers] if args.output is None else _written(args, result)
     number = None if choice.view is None else choice.view + 1  # as people count
     document = {"scene": str(path), "view": number, "backend": renderer.backend}
     document.update(answers_document(scene, result, files))
-    say_warnings(dict.fromkeys(answer.note for answer in result.answers if answer.note))
+    say_warnings(dict.fromkeys(notes))
     if args.json:
         write_json(document, out)
     else:
         print("\n".join(_line(entry, document["unit"]) for entry in document["prompts"]), file=out)
+
+
+def _elsewhere(
+    scene: "Scene",
+    result: "QueryResult",
+    mode: "Mode",
+    negatives: list[str] | None,
+    render: Callable[["Scene", "Camera"], "Frame"],
+) -> list[str]:
+    """A sentence for each phrase that was not found in the first photo and is found in another: the one whose
+    own Gaussians answer it most, looked at."""
+    from langflash_core import pipeline
+    from langflash_core.language.gaussians import gaussian_relevance
+    from langflash_core.language.spaces import language_space
+    from langflash_core.language.spoken import compile_spoken
+
+    missed = [answer.prompt for answer in result.answers if not answer.found]
+    if not missed or scene.view_ids is None or scene.num_views < 2:
+        return []
+    space = language_space(scene.semantics.space)
+    compiled = compile_spoken(scene, space, missed, negatives=negatives, mode=mode)
+    told, answering = [], gaussian_relevance(scene.semantics, compiled) >= compiled.threshold
+    for prompt, hits in zip(missed, answering, strict=True):
+        counts = scene.view_ids[hits].long().bincount(minlength=scene.num_views)
+        view = int(counts.argmax())
+        if view and counts[view]:
+            seen = pipeline.query(scene, [prompt], view=view, mode=mode, negatives=negatives, render=render)
+            if seen.answers[0].found:
+                said = f"{prompt!r} is not in photo 1, but photo {view + 1} shows it"
+                told.append(f"{said}; add --view {view + 1}")
+    return told
 
 
 def _written(args: Namespace, result: "QueryResult") -> list[dict[str, str]]:

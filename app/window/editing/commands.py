@@ -50,7 +50,7 @@ class SelectThing:
     combine: Combine = "replace"
 
     def apply(self, state: State) -> State:
-        return state.with_editing(drag=(), waiting="" if state.scene.info is None else "Selecting")
+        return state.with_editing(drag=(), waiting="" if state.scene.info is None else "Finding things")
 
 
 @dataclass(frozen=True)

@@ -55,7 +55,7 @@ def draw_all(state: State, look: Look) -> tuple[list[do.Command], tuple[int, int
         issued += axes.draw(state, look, place, size)
         issued += film_panel.draw(state, look, place, size)
         issued += tour_panel.draw(state, look, place, size)
-        issued += inventory_panel.draw(state, look, place, size)
+        issued += inventory_panel.draw(state, look, place, size, _above_views(state, look, size))
         issued += cleaning.draw(state, look, place, size)
         issued += dictionary.draw(state, look, place, size)
     issued += recovery_panels.draw_offer(state, look, place, size)

@@ -39,11 +39,12 @@ def button(state: State) -> list[do.Command]:
     return [take.ShowInventory(not state.listing.open)] if pressed else []
 
 
-def draw(state: State, look: Look, place: ImVec2, size: ImVec2) -> list[do.Command]:
-    """The window over the picture's right side, or over the panel where that is narrow."""
+def draw(state: State, look: Look, place: ImVec2, size: ImVec2, above: ImVec2) -> list[do.Command]:
+    """The window over the picture's right side, or over the panel where that is narrow. above: the size of
+    the picture's place without the strip of photos at its foot, whose buttons it does not cover."""
     if not state.listing.open:
         return []
-    corner, extent = _stands(look, place, size)
+    corner, extent = _stands(look, place, size, above)
     imgui.set_next_window_pos(corner, imgui.Cond_.appearing)
     imgui.set_next_window_size(extent, imgui.Cond_.appearing)
     imgui.set_next_window_size_constraints(look.vec(*_LEAST), imgui.get_io().display_size)
@@ -60,7 +61,7 @@ def draw(state: State, look: Look, place: ImVec2, size: ImVec2) -> list[do.Comma
     return issued if kept else [*issued, take.ShowInventory(False)]
 
 
-def _stands(look: Look, place: ImVec2, size: ImVec2) -> tuple[ImVec2, ImVec2]:
+def _stands(look: Look, place: ImVec2, size: ImVec2, above: ImVec2) -> tuple[ImVec2, ImVec2]:
     """Its corner and its size where it opens."""
     aside = boxes.over_panel(place, size, look)
     if aside is not None:
@@ -68,7 +69,7 @@ def _stands(look: Look, place: ImVec2, size: ImVec2) -> tuple[ImVec2, ImVec2]:
     margin = look.px(_MARGIN)
     top = place.y + look.px(_BELOW)
     width = min(look.px(_SIZE[0]), size.x - 2 * margin)
-    height = min(look.px(_SIZE[1]), max(place.y + size.y - top - margin, look.px(_LEAST[1])))
+    height = min(look.px(_SIZE[1]), max(place.y + above.y - top - margin, look.px(_LEAST[1])))
     return ImVec2(place.x + size.x - margin - width, top), ImVec2(width, height)
 
 

@@ -319,7 +319,7 @@ def judge_walls(
     """Errors of the plan's walls that are true ones; how many true ones are found, and how many are none."""
     to_room = _to_room(found, staged)
     walls, eye = staged.room.shell.walls, np.linalg.inv(staged.home)[[0, 2], 3]
-    errors, hits, wrong = [], set(), 0
+    errors, hits, wrong, claimed = [], set(), 0, 0
     for wall in plan.walls:
         start, end = to_room(wall.start), to_room(wall.end)
         along, middle = (end - start) / np.linalg.norm(end - start), (start + end) / 2
@@ -331,13 +331,17 @@ def judge_walls(
         ]
         off, number = min(near, default=(math.inf, -1))
         if off > _AT_WALL:
-            wrong += 1
+            wrong, claimed = wrong + 1, claimed + (not wall.doubt)
             continue
         hits.add(number)
         errors.append(off / max(abs(float((eye - walls[number].start) @ walls[number].inward)), _NEAREST))
     seen = _walls_seen(staged)
     recall = len(seen & hits) / len(seen) if seen else math.nan
-    return tuple(errors), {"wall_recall": recall, "walls_wrong": float(wrong)}
+    return tuple(errors), {
+        "wall_recall": recall,
+        "walls_wrong": float(wrong),
+        "walls_claimed": float(claimed),
+    }
 
 
 def _to_room(found: Inventory, staged: StagedRoom) -> Callable[[tuple[float, float]], np.ndarray]:
@@ -421,6 +425,7 @@ MEASURES = (
     ("Walls within 5 % of their distance", "wall_right"),
     ("Walls that photos see: recall", "wall_recall"),
     ("Walls that are none, a room", "walls_wrong"),
+    ("... and not drawn as doubted", "walls_claimed"),
 )  # fmt: skip
 
 

@@ -12,7 +12,7 @@ from html import escape
 
 from langflash_core.inventory.plan import Opening, Place, Plan, PlanWall
 from langflash_core.inventory.things import Thing
-from langflash_core.writing.inventory.words import SURE, scale_note, size
+from langflash_core.writing.inventory.words import doubt_of, scale_note, size
 
 SCALES = (10, 20, 25, 50, 100, 200, 500)
 """1 to so many, on paper."""
@@ -25,6 +25,7 @@ _BADGE = 1.9  # mm, radius
 _STYLE = """
 .plan text { font-family: 'Helvetica Neue', Helvetica, Arial, sans-serif; fill: #1d2126; }
 .plan .wall { stroke: #1d2126; stroke-width: 1.5; stroke-linecap: square; fill: none; }
+.plan .doubt { stroke: #8a929c; stroke-width: .7; stroke-dasharray: 2 1.4; fill: none; }
 .plan .gap { stroke: #fff; stroke-width: 1.9; }
 .plan .leaf { stroke: #1d2126; stroke-width: .35; fill: none; }
 .plan .swing { stroke: #8a929c; stroke-width: .18; stroke-dasharray: .8 .6; fill: none; }
@@ -77,7 +78,7 @@ def plan_svg(plan: Plan, title: str, *, headed: bool = True) -> str:
         f'<text class="title" x="{_EDGE}" y="12">{escape(title)}</text>' if headed else "",
         f'<text class="note" x="{_EDGE}" y="17">Floor plan, {said}. '
         f"{escape(scale_note(plan.guess, plan.unit))}</text>",
-        *(_thing(paper, thing) for thing in sorted(plan.things, key=lambda t: -t.size[0] * t.size[1])),
+        *(_thing(paper, thing, doubt_of(thing, plan)) for thing in sorted(plan.things, key=_area)),
         *(_wall(paper, wall) for wall in plan.walls),
         *(_opening(paper, opening, plan) for opening in plan.openings),
         *(_badge(number + 1, place) for number, place in enumerate(_spread(paper, plan.things))),
@@ -93,15 +94,22 @@ def plan_svg(plan: Plan, title: str, *, headed: bool = True) -> str:
 
 
 def _wall(paper: _Paper, wall: PlanWall) -> str:
-    return _drawn_line("wall", paper.at(wall.start), paper.at(wall.end))
+    """A line; grey and dashed, with the reason, where it may be none."""
+    line = _drawn_line("doubt" if wall.doubt else "wall", paper.at(wall.start), paper.at(wall.end))
+    return f"<g><title>Perhaps no wall: {wall.doubt}</title>{line}</g>" if wall.doubt else line
 
 
-def _thing(paper: _Paper, thing: Thing) -> str:
-    """Its outline; dashed where it hangs above heads, grey where it only may be what it is called."""
+def _area(thing: Thing) -> float:
+    """The largest are drawn first."""
+    return -thing.size[0] * thing.size[1]
+
+
+def _thing(paper: _Paper, thing: Thing, doubt: str) -> str:
+    """Its outline; dashed where it hangs above heads, grey where it is doubted."""
     hangs = thing.bottom > _HANGS * max(1e-6, abs(thing.bottom) + thing.size[2])
-    kind = "high" if hangs else "unsure" if thing.sure < SURE else "thing"
+    kind = "high" if hangs else "unsure" if doubt else "thing"
     points = " ".join(f"{x:.2f},{y:.2f}" for x, y in (paper.at((e, n)) for e, n in thing.corners.tolist()))
-    title = f"<title>{escape(thing.title)}</title>"
+    title = f"<title>{escape(thing.title)}{f': {doubt}' if doubt else ''}</title>"
     return f'<polygon class="{kind}" points="{points}" stroke-linejoin="round">{title}</polygon>'
 
 
@@ -205,7 +213,7 @@ def _list(plan: Plan, left: float, listed: list[Thing]) -> str:
             if badge
             else ""
         )
-        maybe = "" if thing.sure >= SURE else "?"
+        maybe = "?" if doubt_of(thing, plan) else ""
         rows.append(
             f'{mark}<text class="name" x="{left + 4:.1f}" y="{y:.2f}">{escape(thing.title)}{maybe}</text>'
             f'<text class="sizes" x="{left + 4:.1f}" y="{y + 3.1:.2f}">{size(thing, plan.unit)}</text>'
@@ -227,13 +235,13 @@ def _bar(paper: _Paper, plan: Plan, y: float) -> str:
 
 
 def _stood(plan: Plan, y: float) -> str:
-    """What the dots are."""
-    if not plan.eyes:
-        return ""
-    return (
-        f'<circle class="eye" cx="{_EDGE + 0.7}" cy="{y:.2f}" r=".7"/>'
-        f'<text class="note" x="{_EDGE + 2.5}" y="{y + 0.9:.2f}">where the photos were taken</text>'
-    )
+    """What the dots are, and how what is doubted is drawn."""
+    said = ["where the photos were taken"] * bool(plan.eyes)
+    said += ["dashed: perhaps no wall"] * any(wall.doubt for wall in plan.walls)
+    said += ["grey, ?: in doubt"] * any(doubt_of(thing, plan) for thing in plan.things)
+    dot = f'<circle class="eye" cx="{_EDGE + 0.7}" cy="{y:.2f}" r=".7"/>' if plan.eyes else ""
+    x = _EDGE + (2.5 if plan.eyes else 0.0)
+    return dot + f'<text class="note" x="{x}" y="{y + 0.9:.2f}">{"; ".join(said)}</text>' if said else ""
 
 
 def _arrow(x: float, y: float) -> str:

@@ -1,6 +1,7 @@
 """A floor plan as DXF, release 12 in text, which every CAD program reads.
 
-Metres (or the scene's units), +x east, +y north. Layers: WALLS, DOORS, WINDOWS, THINGS, NAMES. A wall is a
+Metres (or the scene's units), +x east, +y north. Layers: WALLS, DOUBTED (walls that may be
+none), DOORS, WINDOWS, THINGS, NAMES. A wall is a
 line, a thing a closed outline with its name and size beside it.
 
 Source: Autodesk's DXF reference, release 12 (AC1009): pairs of a group code and a value, a line each.
@@ -11,7 +12,7 @@ from collections.abc import Sequence
 from langflash_core.inventory.plan import Place, Plan
 from langflash_core.writing.inventory.words import size
 
-_COLOURS = {"WALLS": 7, "DOORS": 3, "WINDOWS": 5, "THINGS": 30, "NAMES": 8}
+_COLOURS = {"WALLS": 7, "DOUBTED": 9, "DOORS": 3, "WINDOWS": 5, "THINGS": 30, "NAMES": 8}
 _TEXT = 0.09  # height of names, of 4 units across
 _UNITS = {"m": 6}  # $INSUNITS
 
@@ -31,7 +32,7 @@ def plan_dxf(plan: Plan) -> str:
         pairs += [(0, "LAYER"), (2, layer), (70, 0), (62, colour), (6, "CONTINUOUS")]
     pairs += [(0, "ENDTAB"), (0, "ENDSEC"), (0, "SECTION"), (2, "ENTITIES")]
     for wall in plan.walls:
-        pairs += _line("WALLS", wall.start, wall.end)
+        pairs += _line("DOUBTED" if wall.doubt else "WALLS", wall.start, wall.end)
     for opening in plan.openings:
         layer = "WINDOWS" if opening.thing.kind == "window" else "DOORS"
         pairs += _line(layer, opening.start, opening.end)

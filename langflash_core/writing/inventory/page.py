@@ -9,7 +9,7 @@ from html import escape
 from langflash_core.inventory.plan import Plan
 from langflash_core.inventory.things import Inventory, Thing
 from langflash_core.writing.inventory.drawing import plan_svg
-from langflash_core.writing.inventory.words import SURE, length, scale_note, size
+from langflash_core.writing.inventory.words import doubt_of, length, scale_note, size
 
 _HEAD = """<!DOCTYPE html>
 <html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width">
@@ -56,7 +56,8 @@ def page_of(found: Inventory, plan: Plan, cutouts: Mapping[str, str], title: str
     kinds = "".join(f"<li><b>{number}</b> {escape(kind)}</li>" for kind, number in found.counts.items())
     numbers = {thing.id: number + 1 for number, thing in enumerate(plan.things)}
     rows = "".join(
-        _row(thing, numbers.get(thing.id), cutouts.get(thing.id), found) for thing in _ordered(found, plan)
+        _row(thing, numbers.get(thing.id), cutouts.get(thing.id), found, doubt_of(thing, plan))
+        for thing in _ordered(found, plan)
     )
     return (
         _HEAD.format(title=escape(title))
@@ -76,10 +77,10 @@ def _ordered(found: Inventory, plan: Plan) -> list[Thing]:
     return [*plan.things, *(thing for thing in found.things if thing not in plan.things)]
 
 
-def _row(thing: Thing, number: int | None, cutout: str | None, found: Inventory) -> str:
+def _row(thing: Thing, number: int | None, cutout: str | None, found: Inventory, doubt: str) -> str:
     picture = f'<img alt="{escape(thing.title)}" src="{cutout}">' if cutout else ""
     own = f"<small>{escape(thing.id)}</small>" if thing.name else ""
-    maybe = "" if thing.sure >= SURE else "<small>maybe</small>"
+    maybe = f"<small>{doubt}</small>" if doubt else ""
     cut = "<small>goes on beyond the photos</small>" if thing.cut else ""
     east, _, north = thing.place
     sides = ("east" if east >= 0 else "west"), ("north" if north >= 0 else "south")

@@ -61,7 +61,8 @@ def document(found: Inventory, plan: Plan | None = None) -> dict[str, Any]:
     if plan is not None:
         said["plan"] = {
             "turn": round(plan.turn, 2),
-            "walls": [_line(wall) for wall in plan.walls],
+            "walls": [{**_line(wall), "doubt": wall.doubt} for wall in plan.walls],
+            "astray": sorted(plan.astray),
             "openings": [{"id": each.thing.id, **_line(each)} for each in plan.openings],
             "eyes": [[round(value, 3) for value in eye] for eye in plan.eyes],
         }

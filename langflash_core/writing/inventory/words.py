@@ -1,10 +1,18 @@
 """How lengths and sureness are said on plans and pages."""
 
 from langflash_core.base.records import Guess
+from langflash_core.inventory.plan import Plan
 from langflash_core.inventory.things import Thing
 
 SURE = 0.95
 """From here on a thing is what it is called; below it may be."""
+
+
+def doubt_of(thing: Thing, plan: Plan | None = None) -> str:
+    """Why a thing may not be as it is listed, or ""."""
+    if thing.sure < SURE:
+        return "it may be something else"
+    return "it goes through a wall" if plan is not None and thing.id in plan.astray else ""
 
 
 def length(value: float, unit: str) -> str:

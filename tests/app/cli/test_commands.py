@@ -100,6 +100,22 @@ def test_query_for_people(run, scene_file, tmp_path):
     assert outcome.err == f"warning: {told}\n"  # no bar, no other warning
 
 
+def test_what_another_photo_shows_is_said(run, tmp_path):
+    """The first photo looks the other way, where nothing is."""
+    scene = stripes()
+    away = torch.diag(torch.tensor([-1.0, 1.0, -1.0, 1.0])) @ scene.viewmats[:1]
+    views = torch.cat((away, scene.viewmats[:1]))
+    ids = torch.ones(len(scene.gaussians), dtype=torch.int64)
+    turned = replace(scene, viewmats=views, Ks=scene.Ks[:1].repeat(2, 1, 1), view_ids=ids, photos=())
+    path = tmp_path / "turned.langflash"
+    save(turned, path)
+    outcome = run("query", path, "armchair", "submarine", *TORCH)
+    assert outcome.out.startswith("not found  armchair")
+    assert "warning: 'armchair' is not in photo 1, but photo 2 shows it; add --view 2\n" in outcome.err
+    assert "'submarine' is not in photo 1" not in outcome.err
+    assert "photo 2" not in run("query", path, "armchair", "--view", 1, *TORCH).err  # asked of that one
+
+
 def test_query_without_a_folder_writes_nothing(run, scene_file, tmp_path, monkeypatch):
     """The same numbers as with one, without the file at the end of the line."""
     kept = run("query", scene_file, "armchair", "submarine", "-o", tmp_path / "out", *TORCH)

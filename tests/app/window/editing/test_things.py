@@ -120,6 +120,7 @@ def test_things_are_prepared_once_the_tool_is_taken(clicked: State) -> None:
     asked: list = []
     hands = Hands(lambda *_: None, lambda *_: None, asked.append, lambda: None, lambda: 0.0)
     effects, taken = EditingEffects(hands, _Place()), point.SetTool(Tool.PICK)  # type: ignore[arg-type]
+    assert after(clicked, edit.SelectThing((5.0, 5.0))).editing.waiting == "Finding things"
     effects.follow(taken, clicked, after(clicked, taken))
     (prepares,) = asked
     assert isinstance(prepares, work.PrepareThings) and list(prepares.run(lambda: False)) == []

@@ -228,10 +228,12 @@ def test_the_panel_stays_in_the_window_and_leaves_the_picture_to_see(
 ) -> None:
     left, top = 348 * scale, 52 * scale
     place, size = ImVec2(left, top), ImVec2(window[0] - left, window[1] - top - 32 * scale)
+    above = ImVec2(size.x, size.y - 88 * scale)  # where there is a strip of photos
     with context(window):
         theme.set_up(scale, "dark")
-        frames(lambda seen: panel.draw(listed, seen, place, size), look(scale))
+        frames(lambda seen: panel.draw(listed, seen, place, size, above), look(scale))
         x0, y0, x1, y1 = box("Inventory")
+    assert x0 < left or y1 <= top + above.y, "it covers the buttons beside the photos"
     assert x0 >= 0 and y0 >= 0 and x1 <= window[0] + 1 and y1 <= window[1] + 1
     covered = max(0.0, min(x1, left + size.x) - max(x0, left))
     assert covered <= 0.65 * size.x
