@@ -342,6 +342,8 @@ class Scene:
         views = f"{self.num_views} view{'s' * (self.num_views > 1)} of {width} x {height} pixels"
         language = f"speaks {self.semantics.space!r} by {atoms} atoms" if atoms else "speaks no language"
         length = f"{scale:.3g} m per scene unit" if scale else "metres per scene unit not known"
+        if not scale and self.record.world and (guess := self.record.world.guess):
+            length = f"about {guess.metres:.2g} m per scene unit"
         return (
             f"Scene: {len(self.gaussians):,} Gaussians{', a layer per photo' * self.layered}; {views}\n"
             f"  {language}; {len(self.photos)} photos kept in it\n"

@@ -5,6 +5,7 @@ import io
 import pydoc
 import subprocess
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -13,6 +14,7 @@ from PIL import Image
 
 import langflash_core as lf
 from langflash_core.__main__ import NAME, find_program
+from langflash_core.base.records import Guess, World
 from langflash_core.base.request import ExportRequest
 from langflash_core.errors import GraphicsError, SceneFileError, ViewError
 from langflash_core.language.spaces import language_space
@@ -57,10 +59,13 @@ def test_a_scene_and_an_answer_are_three_lines(room):
     first, second, third = repr(room).splitlines()
     assert "240 Gaussians" in first and "2 views of 96 x 64" in first
     assert "'minilm' by 3 atoms" in second and "not known" in third
+    world = World((1.0, 0, 0, 0), (0.0, 0, 0), guess=Guess(2.37, 1.8, 3.1, ("depth",)))
+    assert "about 2.4 m per scene unit" in repr(room.with_record(world=world))
+    assert "  3 m per scene unit" in repr(room.with_record(world=world, metric_scale=3.0))
     result = lf.query(room, ["couch", "elephant"], render=reference)
     first, second, third = repr(result).splitlines()
     assert "1 of 2 phrases" in first
-    assert "found: couch 0." in second and "not found: elephant 0." in third
+    assert "  found: couch 1.00" in second and "not found: elephant 0." in third
     assert all(len(line) < LINE / 3 for told in (room, result) for line in repr(told).splitlines())
 
 
@@ -113,6 +118,14 @@ def test_a_view_is_drawn_and_shown(room):
     assert picture.size == (48, 32)
     with pytest.raises(ViewError, match="no view 2"):
         lf.render(room, view=2)
+
+
+def test_a_photos_view_has_the_photos_size(room):
+    stored = io.BytesIO()
+    Image.new("RGB", (192, 128)).save(stored, "PNG")
+    kept = replace(room, photos=(stored.getvalue(),) * 2)
+    assert lf.render(kept, view=1, render=TorchRenderer()).rgb.shape == (128, 192, 3)
+    assert lf.render(kept, camera=kept.camera(1), render=TorchRenderer()).rgb.shape == (64, 96, 3)
 
 
 def test_a_renderer_that_is_given_draws(room):

@@ -9,6 +9,7 @@ from langflash_core.__main__ import in_program
 from langflash_core.export import opened
 from langflash_core.pipeline import seen_from
 from langflash_core.types import Camera, Frame, Scene
+from langflash_core.writing.cameras import kept_size
 from langflash_core.writing.renderers import Renderer
 
 
@@ -25,7 +26,7 @@ def render(
     Args:
         scene: or the path of one.
         view: input photo whose camera is used, from 0; not asked for where `camera` is given.
-        size: (width, height) in pixels; None: the camera's own.
+        size: (width, height) in pixels; None: that of the photo as the scene keeps it, or the camera's own.
         render: who draws, as a `renderer()` that stays open; None: one that is opened for this picture.
 
     Raises:
@@ -33,6 +34,8 @@ def render(
         SceneFileError: the path holds no scene. InputError: neither a scene nor a path was given.
     """
     scene = opened(scene)
+    if camera is None and size is None and 0 <= view < scene.num_views:
+        size = kept_size(scene, view)
     chosen = seen_from(scene, view, camera, size)
     with torch.no_grad():
         if render is not None:
