@@ -10,6 +10,7 @@ from ..editing import pointing as point
 from ..editing.panels import gizmo
 from ..editing.state import Tool
 from ..filming import commands as film
+from ..inventory import commands as inventory
 from ..opening import commands as opening
 from ..opening.panels import welcome
 from ..scene import commands as show
@@ -87,8 +88,8 @@ def _covered(state: State) -> bool:
 
 
 def _escape(state: State) -> list[do.Command]:
-    """One step back: a dialog, a menu, a job, an answer, a preview, a tool. Never out: one press too many
-    would end the program."""
+    """One step back: a dialog, a menu, a job, an answer, a preview, a tool, the inventory. Never out: one
+    press too many would end the program."""
     editing = state.editing
     if state.dialog:
         return [opening.PlaceFound(None) if state.dialog is Dialog.PLACE else do.ShowDialog(None)]
@@ -112,4 +113,6 @@ def _escape(state: State) -> list[do.Command]:
         return [point.ClearRuler()]
     if editing.drag:
         return [point.Drag(())]
-    return [] if editing.tool is Tool.MOVE else [point.SetTool(Tool.MOVE)]
+    if editing.tool is not Tool.MOVE:
+        return [point.SetTool(Tool.MOVE)]
+    return [inventory.ShowInventory(False)] if state.listing.open else []

@@ -10,7 +10,8 @@ from imgui_bundle import imgui
 
 from app.window import commands as do
 from app.window.dialogs import Dialog
-from app.window.editing.state import Floaters
+from app.window.editing import pointing as point
+from app.window.editing.state import Floaters, Tool
 from app.window.exporting import commands as export
 from app.window.frame import keys, layout
 from app.window.inventory import commands as take
@@ -168,3 +169,12 @@ def test_the_key_of_the_list_works_while_a_name_is_typed(monkeypatch) -> None:
         hands.press(KEY.tab)
         assert keys.typing()
         assert take.ShowInventory(False) in hands.press(KEY.l, held=KEY.mod_ctrl)
+
+
+def test_escape_closes_the_list_last(monkeypatch) -> None:
+    states = [listed().with_editing(tool=Tool.LASSO)]
+    with keyboard(_SIZES[0], monkeypatch, states) as hands:
+        assert hands.press(KEY.escape) == [point.SetTool(Tool.MOVE)]
+        states.append(listed())
+        hands.frames(2)
+        assert hands.press(KEY.escape) == [take.ShowInventory(False)]
