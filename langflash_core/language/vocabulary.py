@@ -36,7 +36,7 @@ coffee table: low living room table; tea table; table for cups and magazines
 desk: writing desk; office desk; school desk; where people write and work; computer desk; workstation
 dressing table: vanity table; makeup table; changing table; table with a mirror for grooming
 game table: pool table; pinball machine; billiard table; football table; ping pong table
-bedside table: night table; night stand; bedside cabinet; small table next to the bed
+bedside table: night table; bedside cabinet; small table next to the bed
 kitchen island: kitchen counter; worktop in the middle of the kitchen; breakfast bar; countertop
 cabinet: storage cabinet; kitchen cabinet; sideboard; cupboard with doors; shelves behind doors
 bookcase: book rack; shelving; open shelves; shelves full of books; holds books

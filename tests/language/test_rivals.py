@@ -6,7 +6,13 @@ import pytest
 import torch
 from torch.nn.functional import normalize
 
-from langflash_core.language.relevance import compile_query, finite_dictionary, relevance_maps, rivalled
+from langflash_core.language.relevance import (
+    apart,
+    compile_query,
+    finite_dictionary,
+    relevance_maps,
+    rivalled,
+)
 from langflash_core.language.rivals import BEHIND, KIN, LEAD, alike, rivalry
 from langflash_core.language.spaces import language_space
 from langflash_core.types import Semantics
@@ -81,6 +87,15 @@ def test_names_of_the_same_thing_are_no_rivals():
     assert (
         rivalled(wall, replace(space, rivals=("wall",)), ["painting"], space.encode(["painting"])).item() < 0
     )
+
+
+def test_a_name_written_apart_is_the_name():
+    space = replace(language_space(), rivals=("bedside table", "wall"))
+    assert apart(["night stand", "nightstand", "white wall lamp", "wall"], space).tolist() == [
+        [True, False], [False, False], [False, False], [False, False],
+    ]  # fmt: skip
+    table, stand = space.encode(["bedside table", "night stand"]).split(1)
+    assert rivalled(table, space, ["night stand"], stand).item() == pytest.approx(LEAD)
 
 
 def test_nothing_has_no_rivals():
