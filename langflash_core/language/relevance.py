@@ -192,8 +192,8 @@ def rivalled(
 
 
 def apart(texts: Sequence[str], space: LanguageSpace) -> Bool[Tensor, "P V"]:
-    """Names that a phrase of two words means which are often written as one: "night stand" has a cosine of .43
-    and less with all but "tv stand", "nightstand" of .68 with "bedside table"."""
+    """Names that a phrase of two words means which are often written as one: "night stand" has a cosine of
+    .43 and less with all but "tv stand", "nightstand" of .68 with "bedside table"."""
     kin = torch.zeros(len(texts), len(space.rivals), dtype=torch.bool)
     two = [row for row, text in enumerate(texts) if len(text.split()) == 2]
     if two:
