@@ -125,9 +125,9 @@ class AskingEffects(Effects):
     def _weigh(self, before: State, state: State) -> None:
         """Have the atoms weighed again once something was deleted or is back."""
         old, new, info = before.editing.marks, state.editing.marks, state.scene.info
-        if info is None or info is not before.scene.info or old is None or new is None:
+        if info is None or info is not before.scene.info or old is None or new is None or new is old:
             return
-        if info.num_atoms and (old.left, old.changes) != (new.left, new.changes):
+        if info.num_atoms and (old.there, old.deleted, old.changes) != (new.there, new.deleted, new.changes):
             self._hands.submit(WeighAtoms(info.serial, info.scene, new))
 
     def after_picture(self, state: State) -> None:
@@ -145,7 +145,7 @@ def _answer(state: State) -> tuple | None:
     if info is None or marks is None or prompt is None or not prompt.found:
         return None
     about = info.serial, prompt.text.strip(), prompt.cut, state.asking.negatives
-    return *about, marks.left, marks.changes, marks.atoms
+    return *about, marks.there, marks.deleted, marks.changes, marks.atoms
 
 
 def _question(state: State) -> tuple:

@@ -50,4 +50,12 @@ def _about(state: State) -> tuple | None:
     info, marks = state.scene.info, state.editing.marks
     if not state.listing.open or info is None or marks is None:
         return None
-    return info.serial, marks.left, marks.changes, marks.atoms, marks.world, marks.metric_scale
+    return (
+        info.serial,
+        marks.there,
+        marks.deleted,
+        marks.changes,
+        marks.atoms,
+        marks.world,
+        marks.metric_scale,
+    )
