@@ -192,13 +192,15 @@ def rivalled(
 
 
 def apart(texts: Sequence[str], space: LanguageSpace) -> Bool[Tensor, "P V"]:
-    """Names that a phrase of two words means which are often written as one: "night stand" has a cosine of
-    .43 and less with all but "tv stand", "nightstand" of .68 with "bedside table"."""
+    """All names of phrases that are names written apart: their own vectors are too poor to be compared.
+    "night stand" is nearest to "tv stand" (.59), "nightstand" to "bedside table" (.68)."""
     kin = torch.zeros(len(texts), len(space.rivals), dtype=torch.bool)
     two = [row for row, text in enumerate(texts) if len(text.split()) == 2]
     if two:
-        together = encode_cached(space, tuple("".join(texts[row].split()) for row in two))
-        kin[two] = together @ encode_cached(space, space.rivals).T > KIN
+        names = encode_cached(space, space.rivals)
+        own = encode_cached(space, tuple(texts[row] for row in two)) @ names.T > KIN
+        joined = encode_cached(space, tuple("".join(texts[row].split()) for row in two)) @ names.T > KIN
+        kin[two] = (joined & ~own).any(1, keepdim=True) & ~own.any(1, keepdim=True)
     return kin
 
 

@@ -92,10 +92,10 @@ def test_names_of_the_same_thing_are_no_rivals():
 def test_a_name_written_apart_is_the_name():
     space = replace(language_space(), rivals=("bedside table", "wall"))
     assert apart(["night stand", "nightstand", "white wall lamp", "wall"], space).tolist() == [
-        [True, False], [False, False], [False, False], [False, False],
+        [True, True], [False, False], [False, False], [False, False],
     ]  # fmt: skip
-    table, stand = space.encode(["bedside table", "night stand"]).split(1)
-    assert rivalled(table, space, ["night stand"], stand).item() == pytest.approx(LEAD)
+    wall, stand = space.encode(["wall", "night stand"]).split(1)
+    assert rivalled(wall, space, ["night stand"], stand).item() == pytest.approx(LEAD)
 
 
 def test_nothing_has_no_rivals():
