@@ -185,20 +185,20 @@ def rivalled(
     if not space.rivals:
         return dictionary.new_zeros(len(dictionary), len(phrases))
     names = encode_cached(space, space.rivals).to(dictionary)
-    kin = alike(texts, space.rivals) | apart(texts, space)
+    kin = alike(texts, space.rivals) | apart(texts, space, phrases.cpu())
     return dictionary.norm(dim=-1, keepdim=True) * rivalry(
         dictionary, phrases, names, kin.to(dictionary.device)
     )
 
 
-def apart(texts: Sequence[str], space: LanguageSpace) -> Bool[Tensor, "P V"]:
+def apart(texts: Sequence[str], space: LanguageSpace, phrases: Float[Tensor, "P C"]) -> Bool[Tensor, "P V"]:
     """All names of phrases that are names written apart: their own vectors are too poor to be compared.
     "night stand" is nearest to "tv stand" (.59), "nightstand" to "bedside table" (.68)."""
     kin = torch.zeros(len(texts), len(space.rivals), dtype=torch.bool)
     two = [row for row, text in enumerate(texts) if len(text.split()) == 2]
     if two:
         names = encode_cached(space, space.rivals)
-        own = encode_cached(space, tuple(texts[row] for row in two)) @ names.T > KIN
+        own = phrases[two].to(names) @ names.T > KIN
         joined = encode_cached(space, tuple("".join(texts[row].split()) for row in two)) @ names.T > KIN
         kin[two] = (joined & ~own).any(1, keepdim=True) & ~own.any(1, keepdim=True)
     return kin

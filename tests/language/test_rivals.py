@@ -91,7 +91,8 @@ def test_names_of_the_same_thing_are_no_rivals():
 
 def test_a_name_written_apart_is_the_name():
     space = replace(language_space(), rivals=("bedside table", "wall"))
-    assert apart(["night stand", "nightstand", "white wall lamp", "wall"], space).tolist() == [
+    asked = ["night stand", "nightstand", "white wall lamp", "wall"]
+    assert apart(asked, space, space.encode(asked)).tolist() == [
         [True, True], [False, False], [False, False], [False, False],
     ]  # fmt: skip
     wall, stand = space.encode(["wall", "night stand"]).split(1)
