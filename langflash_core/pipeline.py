@@ -127,6 +127,46 @@ def reconstruct(
     return scene_of(options, run, Networks() if networks is None else networks, ahead)
 
 
+def add_photos(
+    scene: Scene | Path | str,
+    photos: Sequence[Path | str],
+    *,
+    device: str = "auto",
+    progress: Progress | None = None,
+    cancelled: Callable[[], bool] | None = None,
+    networks: "Networks | None" = None,
+) -> Scene:
+    """A finished scene with a layer of each of some more photos; what it has stays as it is.
+
+    Each photo is reconstructed with the four of the scene's that show most of the same, which the file keeps,
+    so that it costs five photos' time however many the scene has. What it says is in atoms of its own.
+
+    Args:
+        scene: of layers, or the path of one. photos: of the same place. The others as `reconstruct`.
+
+    Raises:
+        InputError: the scene has no layers or keeps no photos, or a photo shows nothing of what it shows.
+        ImageError, WeightsError, Cancelled: as `reconstruct`.
+    """
+    from langflash_core.images.pictures import photo_paths
+    from langflash_core.reconstruction.adding import scene_with
+
+    scene = opened(scene)
+
+    def make(files: Sequence[Path], fields: Sequence[float], poses: Tensor) -> Scene:
+        return reconstruct(
+            files,
+            fov=fields,
+            viewmats=poses,
+            device=device,
+            progress=progress,
+            cancelled=cancelled,
+            networks=networks,
+        )
+
+    return scene_with(scene, photo_paths(photos), make)
+
+
 def query(
     scene: Scene | Path | str,
     prompts: Sequence[str] | str,

@@ -9,7 +9,7 @@ LAB = ("rooms", "labels", "train", "eval", "bench-network")
 """Commands of `langflash lab`, which make and judge the weights."""
 
 GROUPS = {
-    "make scenes": ("reconstruct", "frames", "batch", "lift"),
+    "make scenes": ("reconstruct", "add", "frames", "batch", "lift"),
     "ask them": ("query", "inventory", "info", "words"),
     "show them": ("view", "render", "tour"),
     "edit them": ("clean", "hide", "level"),

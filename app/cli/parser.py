@@ -15,6 +15,7 @@ _JUDGING, _SCENES, _SHOWING = "words.judging", "words.scenes", "words.showing"
 COMMANDS = {
     "view": _SCENES,
     "reconstruct": _SCENES,
+    "add": _SCENES,
     "frames": _SCENES,
     "batch": _SCENES,
     "query": _SCENES,

@@ -99,6 +99,23 @@ def match_photos(
     return KeyPoints(tuple(positions), pairs)
 
 
+def match_with(
+    known: Sequence[bytes], new: Sequence[bytes], check: Callable[[], None] = lambda: None
+) -> KeyPoints:
+    """Key points of photos as JPEG bytes, those that are known first, and what corresponds between each known
+    one and each new one."""
+    described = []
+    for source in (*known, *new):
+        check()
+        described.append(detect(_working_size(decoded(source)), _FEATURES[True]))
+    pairs = {
+        (i, j): match_descriptors(described[i][1], described[j][1])
+        for j in range(len(known), len(described))
+        for i in range(len(known))
+    }
+    return KeyPoints(tuple(positions for positions, _ in described), pairs)
+
+
 def decoded(source: bytes) -> UInt8[np.ndarray, "h w"]:
     """A picture (h, w) uint8, grey, of JPEG bytes."""
     grey = cv2.imdecode(np.frombuffer(source, np.uint8), cv2.IMREAD_GRAYSCALE)

@@ -108,6 +108,12 @@ def known_lenses(
     return Lenses(tuple(of), tuple(fields), tuple(doubts), tuple(recorded), note)
 
 
+def exif_fov(photo: PhotoFacts) -> float | None:
+    """Degrees of the longer side, or None where `exif_focal` is."""
+    focal = exif_focal(photo)
+    return focal and 2 * math.degrees(math.atan(max(photo.width, photo.height) / (2 * focal)))
+
+
 def exif_focal(photo: PhotoFacts) -> float | None:
     """Focal length in pixels of the photo, or None where EXIF does not say or cannot be right.
 

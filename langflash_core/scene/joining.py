@@ -52,20 +52,46 @@ def joined(
         raise ValueError("second: expected a scene without layers, received one of layers; fuse it before")
     _check(first, second, names)
     placed = changed(second.gaussians, (beside(first if shown is None else shown, second),))
-    gaussians = _stacked(first.gaussians, placed)
     view_ids = None
     if first.view_ids is not None:
         view_ids = torch.cat((first.view_ids, first.view_ids.new_full((len(placed),), -1)))
+    return _behind(first, replace(second, gaussians=placed), view_ids)
+
+
+def append_layers(scene: Scene, part: Scene) -> Scene:
+    """The scene with layers of more photos behind its own, and their views behind its views.
+
+    The record keeps what it says of the scene's own photos, but for their light, which has to be of all.
+
+    Args:
+        part: in the scene's world and light.
+
+    Raises:
+        InputError: as `joined`.
+        ValueError: nobody knows which photo made what.
+    """
+    if scene.view_ids is None or part.view_ids is None:
+        raise ValueError("view_ids: expected the photo that made each Gaussian, received none")
+    _check(scene, part, ("this scene", "what is added"))
+    views = {name: torch.cat((getattr(scene, name), getattr(part, name))) for name in ("viewmats", "Ks")}
+    view_ids = torch.cat((scene.view_ids, part.view_ids + scene.num_views))
+    record = replace(scene.record, light={})
+    scene = replace(scene, **views, photos=(*scene.photos, *part.photos), record=record)
+    return _behind(scene, part, view_ids)
+
+
+def _behind(first: Scene, second: Scene, view_ids: Tensor | None) -> Scene:
+    """The second's Gaussians and atoms behind the first's, where they are."""
+    after, ours, theirs = first.semantics.num_atoms, first.record, second.record
     scene = replace(
         first,
-        gaussians=gaussians,
+        gaussians=_stacked(first.gaussians, second.gaussians),
         semantics=_joined_semantics(first.semantics, second.semantics),
         view_ids=view_ids,
         levels=_known_of_both(first, second, first.levels, second.levels, 0),
         confidences=_known_of_both(first, second, first.confidences, second.confidences, 1),
-        record=replace(first.record, atom_names={}, atom_denials={}, silent_atoms=(), lone_atoms=()),
+        record=replace(ours, atom_names={}, atom_denials={}, silent_atoms=(), lone_atoms=()),
     )
-    after, ours, theirs = first.semantics.num_atoms, first.record, second.record
     return scene.with_record(
         atom_names={**ours.atom_names, **{k + after: name for k, name in theirs.atom_names.items()}},
         atom_denials={**ours.atom_denials, **{k + after: words for k, words in theirs.atom_denials.items()}},

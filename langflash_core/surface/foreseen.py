@@ -60,7 +60,7 @@ def foresight(rig: Rig) -> Foresight:
         camera = Camera(rig.viewmats[view], rig.Ks[view], width, height)
         chosen = _beside(rig, view, camera)
         pictures = [
-            _pointed(rig.points(other), rig.photos[other].flatten(1), camera) for other in chosen.views
+            draw_points(rig.points(other), rig.photos[other].flatten(1), camera) for other in chosen.views
         ]
         picture, shown = _blended(pictures, chosen)
         alike = _alike(picture, F.avg_pool2d(image, CELL), shown)
@@ -86,7 +86,7 @@ def _blended(
     return (counts[:, None] * colours).sum(0), there.any(0)
 
 
-def _pointed(
+def draw_points(
     points: Float[Tensor, "3 n"], colours: Float[Tensor, "3 n"], camera: Camera
 ) -> tuple[Float[Tensor, "3 h w"], Float[Tensor, "h w"]]:
     """Mean colours of the nearest points in each cell of a picture, and their depth; endless where there are

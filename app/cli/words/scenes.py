@@ -107,6 +107,16 @@ def add_reconstruct(commands) -> None:
     add_json(command)
 
 
+def add_add(commands) -> None:
+    """`langflash add`."""
+    command = new_command(commands, "add", "put more photos into a finished scene")
+    command.add_argument("scene", type=Path, metavar="SCENE")
+    command.add_argument("photos", nargs="+", type=Path, metavar="PHOTO", help="of the same place")
+    add_output(command, "SCENE", "the scene to write")
+    command.add_argument("--device", choices=("auto", "cpu", "cuda"), default="auto")
+    add_json(command)
+
+
 def add_frames(commands) -> None:
     """`langflash frames`."""
     command = new_command(

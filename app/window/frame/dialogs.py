@@ -55,7 +55,7 @@ _POINTING = 6  # commands of a family whose keys point where they go
 COLUMNS = ((None, "View", "Program"), ("File", "Find", "Tools", "Edit"))  # of help; None: the gestures
 _CLOSING = (
     do.ShowDialog | show.SaveScene | show.OpenPaths | show.Instead | show.All | show.GoOn | show.SaveFirst
-    | merging.MergeScene | opening.LookForPlace | opening.PlaceFound | opening.TakeFrames
+    | merging.MergeScene | merging.AddToScene | opening.LookForPlace | opening.PlaceFound | opening.TakeFrames
     | ask.SavePrompts | ask.LoadPrompts | clean.SaveRecipe | clean.LoadRecipe | export.Export
 )  # fmt: skip
 

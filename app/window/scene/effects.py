@@ -42,7 +42,7 @@ from .commands import (
     dropped,
 )
 from .drops import sort_drop, told_few
-from .merging import Merged, MergeScene
+from .merging import AddToScene, Merged, MergeScene
 from .standing import LevelScene
 from .state import WHOLE, WHOLE_PHOTOS, SceneInfo
 from .unfinished import FEWEST
@@ -55,6 +55,7 @@ from .work import (
     LoadScene,
     LookForWork,
     MakeThumbnails,
+    PutInPhotos,
     ReconstructPhotos,
     ShowPhotos,
     Thin,
@@ -80,8 +81,8 @@ class SceneEffects(Effects):
         match command:
             case OpenPaths(paths, was_dropped):
                 self._open(paths, was_dropped, state)
-            case MergeScene(path) if state.scene.info is not None and state.editing.marks is not None:
-                submit(JoinScenes(state.scene.info, state.editing.marks, path))
+            case MergeScene() | AddToScene():
+                self._grow(command, state)
             case AddPhotos(paths):
                 submit(MakeThumbnails(paths))
             case Reconstruct() if state.scene.photos:
@@ -114,6 +115,16 @@ class SceneEffects(Effects):
                 self._go_on(command, before, state)
         self._look_for_work(before, state)
         self._show_whole(before, state)
+
+    def _grow(self, command: MergeScene | AddToScene, state: State) -> None:
+        """What comes to the scene on show."""
+        info, marks = state.scene.info, state.editing.marks
+        if info is None or marks is None:
+            return
+        if isinstance(command, MergeScene):
+            self._hands.submit(JoinScenes(info, marks, command.path))
+        else:
+            self._hands.submit(PutInPhotos(info, marks, command.photos, self._networks))
 
     def _hold(self, at: Point) -> None:
         """A hand turns the scene around what the picture shows under it."""

@@ -56,10 +56,34 @@ class MergeScene:
 
 
 @dataclass(frozen=True)
+class AddToScene:
+    """Give the scene on show a layer of each of these photos; replaces a job under way."""
+
+    photos: tuple[Path, ...]
+
+    def apply(self, state: State) -> State:
+        job = Job(f"Adding {called_photos(self.photos)}", "photos", started=state.now)
+        return replace(state.with_scene(job=job), dialog=None)
+
+
+def called_photos(photos: tuple[Path, ...]) -> str:
+    """The one photo's name, or how many there are."""
+    return photos[0].name if len(photos) == 1 else f"{len(photos)} photos"
+
+
+def can_grow(state: State, count: int) -> bool:
+    """Whether so many photos can be added to the scene on show as it is: it has layers, keeps its photos, and
+    not most of it would be new."""
+    scene = None if state.scene.info is None else state.scene.info.scene
+    return scene is not None and scene.layered and bool(scene.photos) and count < scene.num_views
+
+
+@dataclass(frozen=True)
 class Merged:
     """The scene with number `serial`, of which there was so much, and another as one scene; or, where `gone`
     says what was taken away, what fills its hole, or stands for it but is not what is `denied`; or `copied`,
-    copies of what was selected, or laid over what is `gone`. beyond: how much of `gone` was not selected."""
+    copies of what was selected, or laid over what is `gone`. beyond: how much of `gone` was not selected.
+    added: what came are layers of more photos."""
 
     serial: int
     there: tuple[int, int]
@@ -69,6 +93,7 @@ class Merged:
     copied: bool = False
     denied: str = ""
     beyond: int = 0
+    added: bool = False
 
     @property
     def said(self) -> str:
@@ -91,7 +116,9 @@ class Merged:
         if self.fits(state):
             return state
         text = f"{self.name} was not merged, since another scene is open now; merge it again."
-        if self.denied:
+        if self.added:
+            text = f"{self.name} was not added, since another scene is open now; add it again."
+        elif self.denied:
             text = "Nothing was removed, since the scene has changed; click it again."
         elif self.copied:
             text = "Nothing was copied, since the scene has changed; copy it again."
@@ -118,6 +145,8 @@ class Merged:
                 label = f"Remove a part of {self.denied}"
         elif self.copied:
             label = f"Copy {len(brought):,}"
+        elif self.added:
+            after, label = replace(before.marks, there=whole.there), f"Add {self.name}"
         history = before.edited(label, after)
         if saved is not None:
             saved = saved.of_size(self.there[0], saved.atoms[: self.there[1]]).of_size(count, whole.atoms)

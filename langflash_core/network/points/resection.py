@@ -7,12 +7,12 @@ problem, SQPnP (Terzakis and Lourakis 2020) for its solution, as OpenCV has them
 
 from dataclasses import dataclass
 
-import cv2
 import numpy as np
 import torch
 from jaxtyping import Float
 from torch import Tensor
 
+from langflash_core.cameras.placing import place_camera
 from langflash_core.geometry.cameras import pixel_grid, project, transform
 
 _POINTS = 4000  # a regular sample; more change the pose by less than its error
@@ -46,27 +46,9 @@ def resect(points: Float[Tensor, "3 H W"], K: Float[Tensor, "3 3"]) -> Resection
     sample = points[:, ::step, ::step].flatten(1).T
     usable = torch.isfinite(sample).all(1)
     pos_w, pixels = sample[usable].double().cpu().numpy(), grid[usable].double().cpu().numpy()
-    if len(pos_w) < 6:
-        return Resection(np.eye(4), 0.0)
-    spread = float(np.median(np.linalg.norm(pos_w - np.median(pos_w, 0), axis=1)))
-    unit = spread if spread > 0 else 1.0
     tolerance = _TOLERANCE * max(height, width) / 256
-    cv2.setRNGSeed(0)
-    found, turn, shift, inliers = cv2.solvePnPRansac(
-        pos_w / unit, pixels, K.double().cpu().numpy(), None,
-        iterationsCount=200, reprojectionError=tolerance, confidence=0.9999, flags=cv2.SOLVEPNP_SQPNP,
-    )  # fmt: skip
-    if not found or inliers is None or len(inliers) < 6:
-        return Resection(np.eye(4), 0.0)
-    keep = inliers[:, 0].astype(np.int64)
-    turn, shift = cv2.solvePnPRefineLM(
-        pos_w[keep] / unit, pixels[keep], K.double().cpu().numpy(), None, turn, shift
-    )
-    viewmat = np.eye(4)
-    viewmat[:3, :3], viewmat[:3, 3] = cv2.Rodrigues(turn)[0], shift[:, 0] * unit
-    if not np.isfinite(viewmat).all():
-        return Resection(np.eye(4), 0.0)
-    return Resection(viewmat, len(keep) / len(pos_w))
+    found = place_camera(pos_w, pixels, K.double().cpu().numpy(), tolerance)
+    return Resection(np.eye(4), 0.0) if found is None else Resection(found.viewmat, float(found.agree.mean()))
 
 
 def depths_and_confidences(

@@ -8,7 +8,7 @@ from ...kit import theme, widgets
 from ...kit.look import Look
 from ...state import State
 from .. import commands as show
-from ..merging import MergeScene
+from ..merging import AddToScene, MergeScene, can_grow
 from ..state import Room
 
 _NAMED = 4  # dropped photos that the question names
@@ -55,14 +55,12 @@ def draw_drop(state: State, look: Look) -> list[do.Command]:
     widgets.muted(f"{state.scene.info.name} is open.")
     widgets.gap(look.px(4))
     issued: list[do.Command] = []
-    imgui.begin_disabled(not state.scene.photos)
+    grows = can_grow(state, len(state.scene.dropped))
+    imgui.begin_disabled(not grows and not state.scene.photos)
     if imgui.button("Add to this room", look.vec(160, 0)):
-        issued.append(show.dropped(state, state.scene.dropped, new=False))
+        issued += _additions(state) if grows else [show.dropped(state, state.scene.dropped, new=False)]
     imgui.end_disabled()
-    known = "Reconstruct from the photos in the tray plus these"
-    widgets.tooltip(
-        known if state.scene.photos else "This room came from a file; its photos are not in the tray"
-    )
+    widgets.tooltip(_addition_says(state, grows))
     widgets.beside(look.px(130))
     if widgets.default_button("New room", look.vec(130, 0)):
         issued.append(show.dropped(state, state.scene.dropped, new=True))
@@ -71,6 +69,21 @@ def draw_drop(state: State, look: Look) -> list[do.Command]:
     if imgui.button("Cancel", look.vec(110, 0)):
         issued.append(do.ShowDialog(None))
     return issued
+
+
+def _additions(state: State) -> list[do.Command]:
+    """Dropped photos as layers of the room; they lie in the tray beside those that it was made of."""
+    photos = state.scene.dropped
+    tray: list[do.Command] = [show.AddPhotos(photos)] if state.scene.photos else []
+    return [*tray, AddToScene(photos)]
+
+
+def _addition_says(state: State, grows: bool) -> str:
+    if grows:
+        return "Each becomes a layer of its own; what the room has, and its edits, stay as they are"
+    if state.scene.photos:
+        return "Reconstruct from the photos in the tray plus these"
+    return "This room came from a file; its photos are not in the tray"
 
 
 def draw_scene_drop(state: State, look: Look) -> list[do.Command]:

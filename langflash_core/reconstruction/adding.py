@@ -1,0 +1,165 @@
+"""One photo more for a finished scene, for the price of some photos, however many the scene has.
+
+The photos that show most of the same as the new one lie in the scene's file, as they were reconstructed, and
+their layers say where what they show is: that places the new camera. With these poses they and the new photo
+make a small scene in the same world, whose new layer then joins the others (`surface.added`). What the scene
+has stays as it is, bit by bit.
+"""
+
+import tempfile
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+import torch
+from jaxtyping import Float
+from torch import Tensor
+
+from langflash_core.base.records import FoundFocal, FoundLens
+from langflash_core.cameras.keypoints import WORKING_SIDE, KeyPoints, match_with
+from langflash_core.cameras.placing import place_camera
+from langflash_core.errors import InputError
+from langflash_core.geometry.cameras import fov_degrees
+from langflash_core.images.decode import PhotoFacts, read_photo
+from langflash_core.images.lens import ASSUMED_FOV, exif_fov
+from langflash_core.images.pictures import MAX_PHOTOS
+from langflash_core.images.straight import straightened
+from langflash_core.images.views import load_views
+from langflash_core.rig.settings import PAIRING
+from langflash_core.surface.added import Shared, add_layers
+from langflash_core.surface.foreseen import CELL, draw_points
+from langflash_core.types import Lenses, Scene, Views
+
+BESIDE = 4
+"""Photos of the scene that each new one is reconstructed with: a view is blended of as many."""
+SAME_LENS = 0.5
+"""Degrees by which recorded fields of view of one lens differ: of a millimetre of some 26, to which they are
+rounded."""
+MISSES = 4.0
+"""Pixels of the photo at `WORKING_SIDE` by which a point of the scene may miss its key point: a fiftieth of
+its depth, from a fifth of the distance aside, at a focal length of 700 are 3."""
+
+Make = Callable[[Sequence[Path], Sequence[float], Float[Tensor, "V 4 4"]], Scene]
+
+
+def scene_with(
+    scene: Scene, photos: Sequence[Path], make: Make, check: Callable[[], None] = lambda: None
+) -> Scene:
+    """The scene with layers of photos more.
+
+    Args:
+        make: photos, the fields of view of their longer sides and their poses to a scene in that world.
+        check: called between photos; what it raises ends the work.
+
+    Raises:
+        InputError: the scene has no layers or keeps no photos, a photo shows too little of what the scene
+            does, or there would be too many. ImageError: a photo cannot be used.
+    """
+    _check(scene, len(photos))
+    views = [_view(scene, path, check) for path in photos]
+    matches = match_with(scene.photos, [view.sources[0] for view in views], check)
+    placed = [_place(scene, matches, number, view) for number, view in enumerate(views)]
+    beside = sorted({other for one in placed for other in one.beside})
+    sources = [*(scene.photos[view] for view in beside), *(view.sources[0] for view in views)]
+    Ks = [*scene.Ks[beside], *(view.Ks[0] for view in views)]
+    sizes = [*(scene.view_size for _ in beside), *(view.size for view in views)]
+    poses = torch.stack([*scene.viewmats[beside].double(), *(one.viewmat for one in placed)])
+    with tempfile.TemporaryDirectory(prefix="langflash-") as folder:
+        files = [Path(folder) / f"{place}.jpg" for place in range(len(sources))]
+        for path, source in zip(files, sources, strict=True):
+            path.write_bytes(source)
+        fields = [max(fov_degrees(K, *size)) for K, size in zip(Ks, sizes, strict=True)]
+        other = make(files, fields, poses)
+    names = [path.name for path in files]
+    other = _renamed(other, dict(zip(names[len(beside) :], (path.name for path in photos), strict=True)))
+    return add_layers(scene, other, _shared(other, dict(zip(names, beside, strict=False))))
+
+
+def _view(scene: Scene, path: Path, check: Callable[[], None]) -> Views:
+    """A new photo as the scene's were taken: with their lens, straightened as they were."""
+    lens = _lens(scene, read_photo(path).facts)
+    field = max(fov_degrees(scene.Ks[0], *scene.view_size)) if lens is None else lens.fov
+    width, height = scene.view_size
+    views = load_views([path], fov=field, area=width * height, multiple=1, check=check)
+    if lens is None or not lens.bend:
+        return views
+    views = replace(views, lenses=Lenses((0,), (field,), (0.0,), (False,)))
+    return straightened(views, [FoundFocal(1.0, 0.0, lens.photos, lens.bend)])
+
+
+def _lens(scene: Scene, photo: PhotoFacts) -> FoundLens | None:
+    """What was found of photos that say the same of their lens, or what the photo says; None where it says
+    nothing."""
+    said = exif_fov(photo)
+    for known in scene.record.lens.get("found", ()):
+        if abs(known["said"] - (ASSUMED_FOV if said is None else said)) < SAME_LENS:
+            return FoundLens(**known)
+    return None if said is None else FoundLens(said, 0.0, 1, said, True)
+
+
+def _shared(other: Scene, numbers: Mapping[str, int]) -> Shared:
+    """Photos of the scene that the other has as well; numbers: theirs in the scene, by name."""
+    theirs = [view for view, name in enumerate(other.record.photos) if name in numbers]
+    return Shared(tuple(numbers[other.record.photos[view]] for view in theirs), tuple(theirs))
+
+
+def _renamed(scene: Scene, names: Mapping[str, str]) -> Scene:
+    """With people's names of photos, in what is said of them, too."""
+    photos, warnings = list(scene.record.photos), list(scene.record.warnings)
+    for held, name in names.items():
+        photos = [name if photo == held else photo for photo in photos]
+        warnings = [line.replace(held, name) for line in warnings]
+    return scene.with_record(photos=tuple(photos), warnings=tuple(warnings))
+
+
+def _check(scene: Scene, count: int) -> None:
+    if not scene.layered or not scene.photos:
+        raise InputError(
+            "this scene keeps no layer and picture of each photo; reconstruct it again with all photos"
+        )
+    if scene.num_views + count > MAX_PHOTOS:
+        raise InputError(
+            f"{scene.num_views + count} photos are too many; a scene has at most {MAX_PHOTOS} of them"
+        )
+
+
+@dataclass(frozen=True)
+class _Placed:
+    """A new photo's pose (4, 4) in the scene's world, and the scene's photos that show most of the same."""
+
+    viewmat: Float[Tensor, "4 4"]
+    beside: list[int]
+
+
+def _place(scene: Scene, matches: KeyPoints, number: int, view: Views) -> _Placed:
+    """By the places that its key points have in the layers of the photos that have them, too."""
+    row = scene.num_views + number
+    beside = sorted(range(scene.num_views), key=lambda other: -len(matches.pairs[other, row]))[:BESIDE]
+    K = view.Ks[0].double().clone()
+    K[:2] *= WORKING_SIDE / max(view.size)
+    points, pixels = [], []
+    for other in beside:
+        ours, own = matches.pairs[other, row].T
+        points.append(_seen_at(scene, other, matches.positions[other][ours]))
+        pixels.append(matches.positions[row][own])
+    points, pixels = np.concatenate(points), np.concatenate(pixels)
+    solid = np.isfinite(points).all(1)
+    placed = place_camera(points[solid], pixels[solid], K.numpy(), MISSES)
+    if placed is None or placed.agree.sum() < PAIRING.few:
+        raise InputError(
+            f"{view.names[0]} could not be placed beside the scene's photos; take one that shows half of "
+            "what one of them shows"
+        )
+    return _Placed(torch.from_numpy(placed.viewmat), beside)
+
+
+def _seen_at(scene: Scene, view: int, pixels: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, "n 3"]:
+    """Points of the world that a photo's own layer shows at key points, pixels at `WORKING_SIDE`; no numbers
+    where it shows none."""
+    means, camera = scene.layer(view).gaussians.means.T, scene.camera(view)
+    points, depths = draw_points(means, means, camera)
+    cells = torch.from_numpy(pixels * max(scene.view_size) / WORKING_SIDE / CELL).long()
+    x, y = (cells[:, axis].clamp(0, side - 1) for axis, side in enumerate(reversed(depths.shape)))
+    there = torch.isfinite(depths[y, x])
+    return torch.where(there[:, None], points[:, y, x].T.double(), torch.nan).numpy()
