@@ -16,6 +16,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Integer, UInt8
 
 from langflash_core.base.optional import optional_packages
+from langflash_core.geometry.pinhole import see
 
 BAND = (
     4.0  # voxels on either side of a surface that count: below 3 noise tears holes, above it thickens edges
@@ -36,13 +37,9 @@ class DepthView:
         self, points: Float[np.ndarray, "n 3"]
     ) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, " n"], Integer[np.ndarray, " n"]]:
         """Depth z of points, the map's depth there (0 for nothing, or beside it), and the pixel, flat."""
-        x, y, z = (points @ self.viewmat[:3, :3].T + self.viewmat[:3, 3]).T
-        ahead = np.where(z > 0, z, np.inf)
-        columns = np.floor(x / ahead * self.K[0, 0] + self.K[0, 2])
-        rows = np.floor(y / ahead * self.K[1, 1] + self.K[1, 2])
         height, width = self.depths.shape
-        inside = (columns >= 0) & (columns < width) & (rows >= 0) & (rows < height) & (z > 0)
-        pixels = np.where(inside, rows * width + columns, 0).astype(np.int64)
+        x, y, z, inside = see(points, self.viewmat, self.K, (width, height))
+        pixels = np.where(inside, np.floor(y) * width + np.floor(x), 0).astype(np.int64)
         return z, np.where(inside, self.depths.reshape(-1)[pixels], 0.0), pixels
 
 

@@ -5,9 +5,10 @@ import itertools
 import pytest
 import torch
 
-from langflash_core.geometry.cameras import invert_rigid, project, transform, unproject
+from langflash_core.geometry.cameras import invert_rigid, transform, unproject
 from langflash_core.rig.rig import Rig
 from langflash_core.surface.consistency import TOLERANCE, outvoted, seen_through
+from tests.geometry.twins import seen_at
 
 K = torch.tensor([[30.0, 0, 16], [0, 30.0, 12], [0, 0, 1]])
 
@@ -79,7 +80,7 @@ def test_several_views_equal_their_twin():
     for view, other in itertools.permutations(range(4), 2):
         pos_c = transform(viewmats[other], means[view])
         for i, ((x, y), z) in enumerate(
-            zip(project(pos_c, Ks[other]).tolist(), pos_c[:, 2].tolist(), strict=True)
+            zip(seen_at(pos_c, Ks[other]).tolist(), pos_c[:, 2].tolist(), strict=True)
         ):
             if z <= 0 or not (0 <= x < 32 and 0 <= y < 24):
                 continue

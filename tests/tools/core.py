@@ -21,14 +21,14 @@ from pathlib import Path
 
 CORE = "langflash_core"
 START = f"{CORE}.pipeline.reconstruct"
-PRIMITIVES = (f"{CORE}.geometry.cameras", f"{CORE}.rig")
+PRIMITIVES = (f"{CORE}.geometry.cameras", f"{CORE}.geometry.pinhole", f"{CORE}.rig")
 FUNCTIONS = (ast.FunctionDef, ast.AsyncFunctionDef)
 IRREGULAR = re.compile(
     "begun|bent|bound|brought|built|caught|chosen|cut|done|drawn|felt|found|given|gone|grown|held|kept|known|"
     "laid|led|left|lit|lost|made|meant|met|put|read|said|seen|sent|set|shown|sought|spent|split|spoken|spread|"
     "stood|swept|taken|taught|thought|told|torn|understood|woven|written"
 )
-PROJECTING = (f"{CORE}.geometry.cameras.pictured", f"{CORE}.geometry.cameras.project")
+PROJECTING = tuple(f"{CORE}.geometry.{name}" for name in ("cameras.project", "pinhole.pictured"))
 CHOOSING = re.compile(
     r"list\[(int|list\[int\]|tuple\[int, int\])\]|tuple\[tuple\[int, \.\.\.\], \.\.\.\]|"
     r"Neighbours|Chosen|tuple\[Int\[Tensor, ' E'\], Int\[Tensor, ' E'\]\]"

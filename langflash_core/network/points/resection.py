@@ -13,7 +13,8 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
-from langflash_core.geometry.cameras import pixel_grid, project, transform
+from langflash_core.geometry.cameras import pixel_grid
+from langflash_core.rig.projected import project_points
 
 _POINTS = 4000  # a regular sample; more change the pose by less than its error
 _TOLERANCE = 2.0  # pixels at 256: how far points stray in a good map
@@ -80,12 +81,10 @@ def depths_and_confidences(
     Returns:
         depths and confidences, (V, H, W): 1 / (1 + error / 3 px), 0 behind the camera.
     """
-    _, _, height, width = points.shape
-    pos_c = transform(viewmats, points.flatten(2).transpose(1, 2))  # (V, H*W, 3)
-    z = pos_c[..., 2].unflatten(1, (height, width))
-    errors = project(pos_c, Ks[:, None]).unflatten(1, (height, width)) - pixel_grid(
-        width, height, like=points
-    )
+    height, width = size = points.shape[2], points.shape[3]
+    there = project_points(points.flatten(2), viewmats, Ks, size)
+    z = there.z.unflatten(1, size)
+    errors = torch.stack((there.x, there.y), -1).unflatten(1, size) - pixel_grid(width, height, like=points)
     trust = 1 / (1 + errors.norm(dim=-1) / (_HALF_TRUST * max(height, width) / 256))
     ahead = (z > 0) & torch.isfinite(trust)
     floor = _NEAREST * z[ahead].median() if bool(ahead.any()) else z.new_tensor(_NEAREST)
