@@ -32,6 +32,8 @@ def turned(points, K, R):
     return points @ R / points[2] * K[0, 0] + K[0, 2]
 
 def near(view, viewmats) -> list[int]: ...
+def pairs(viewmats) -> list[tuple[int, int]]: ...
+def order(viewmats) -> list[int]: ...
 """
 
 
@@ -44,10 +46,10 @@ def test_each_kind_is_counted(tmp_path):
     of = {name: list(held) for name, held in found.items() if isinstance(held, list)}
     core = "langflash_core"
     assert of["numbers named in modules"] == [f"{core}.other._TWO", f"{core}.other.SIZES"]
-    assert found["numbers in bodies, but 0, 1, 2"] == 1 and found["functions"] == 6
+    assert found["numbers in bodies, but 0, 1, 2"] == 1 and found["functions"] == 8
     assert of["modules at the root"] == ["deep", "other", "pipeline"]
     assert of["reprojections"] == [f"{core}.deep.look", f"{core}.deep.turned"]
-    assert of["neighbour rules"] == [f"{core}.deep.near"]
+    assert of["neighbour rules"] == [f"{core}.deep.near", f"{core}.deep.pairs"]
     assert of["bare participles"] == [
         f"{core}.deep.turned",
         f"{core}.other.helped",

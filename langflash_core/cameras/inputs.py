@@ -8,7 +8,7 @@ from jaxtyping import Float
 from langflash_core.cameras.dense import match_cells
 from langflash_core.cameras.keypoints import WORKING_SIDE, KeyPoints
 from langflash_core.cameras.matching import Matches
-from langflash_core.geometry.pinhole import pictured, unpictured
+from langflash_core.geometry.pinhole import from_pixels, to_pixels
 
 DENSE_SIGMA = 3.0
 """Pixels at the working size: a third of a cell."""
@@ -53,7 +53,7 @@ def dense_matches(view_i: PoseInput, view_j: PoseInput) -> Matches:
     """Cells of local features that choose each other."""
     cells_i, cells_j = match_cells(view_i.local, view_j.local)
     x_i, x_j = (
-        unpictured(cells * (np.array(view.size) / view.local.shape[:0:-1]), view.K)
+        from_pixels(cells * (np.array(view.size) / view.local.shape[:0:-1]), view.K)
         for view, cells in ((view_i, cells_i), (view_j, cells_j))
     )
     return Matches(x_i, x_j, normalised_sigma(view_j, DENSE_SIGMA), np.full((len(x_i), 2), -1))
@@ -72,11 +72,11 @@ def normalised_sigma(view: PoseInput, pixels: float) -> float:
 
 def without_camera(pixels: Float[np.ndarray, "n 2"], view: PoseInput) -> Float[np.ndarray, "n 2"]:
     """Pixels of a picture whose longer side is `WORKING_SIDE` -> normalised coordinates (n, 2)."""
-    return unpictured(pixels * (max(view.size) / WORKING_SIDE), view.K)
+    return from_pixels(pixels * (max(view.size) / WORKING_SIDE), view.K)
 
 
 def depths_at(view: PoseInput, x: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, " n"]:
     """z (n,) of the monocular map at normalised coordinates (n, 2)."""
-    pixels = np.array(pictured(*x.T, 1.0, view.K)).astype(int)
+    pixels = np.array(to_pixels(*x.T, 1.0, view.K)).astype(int)
     columns, rows = np.clip(pixels, 0, np.array(view.size)[:, None] - 1)
     return view.depth[rows, columns].astype(np.float64)

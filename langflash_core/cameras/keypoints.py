@@ -10,7 +10,8 @@ import numpy as np
 from jaxtyping import Float, Int, Shaped, UInt8
 
 from langflash_core.cameras.matching import detect, match_descriptors
-from langflash_core.cameras.retrieval import likely_pairs
+from langflash_core.cameras.retrieval import likeness
+from langflash_core.rig.pairs import likely_pairs
 
 Told = Callable[[str, int, int], None]
 
@@ -26,6 +27,11 @@ class KeyPoints:
 
     positions: tuple[Float[np.ndarray, "_ 2"], ...]
     pairs: dict[tuple[int, int], Int[np.ndarray, "_ 2"]]
+
+    @property
+    def counts(self) -> dict[tuple[int, int], int]:
+        """How many matches each pair has."""
+        return {pair: len(rows) for pair, rows in self.pairs.items()}
 
     def arrays(self) -> dict[str, Shaped[np.ndarray, "..."]]:
         """Both, end to end, to be kept."""
@@ -91,7 +97,7 @@ def match_photos(
         own_positions, own_descriptors = detect(_working_size(grey), limit)
         positions.append(own_positions)
         descriptors.append(own_descriptors)
-    pairs, likely = {}, likely_pairs(descriptors)
+    pairs, likely = {}, likely_pairs(len(descriptors), lambda: likeness(descriptors))
     for number, (i, j) in enumerate(likely):
         check()
         told("matching pairs", number, len(likely))

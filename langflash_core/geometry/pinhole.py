@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 
-def pictured(x: Any, y: Any, depths: Any, K: Any) -> tuple[Any, Any]:
+def to_pixels(x: Any, y: Any, depths: Any, K: Any) -> tuple[Any, Any]:
     """Pixels x and y (..., n) of points (..., n) in the frame of a camera, K (..., 3, 3).
 
     Args:
@@ -20,7 +20,7 @@ def pictured(x: Any, y: Any, depths: Any, K: Any) -> tuple[Any, Any]:
     return across, y / depths * K[..., 1, 1, None] + K[..., 1, 2, None]
 
 
-def unpictured(pixels: Any, K: Any) -> Any:
+def from_pixels(pixels: Any, K: Any) -> Any:
     """x / z and y / z (n, 2) of what is seen at pixels (n, 2); K (3, 3)."""
     return (pixels - K[:2, 2]) / K.diagonal()[:2]
 
@@ -53,5 +53,5 @@ def see(
     x, y, z = (points @ viewmat[:3, :3].T + viewmat[:3, 3]).T
     ahead = z > nearest
     depths = np.ones(1) if orthographic else np.where(ahead, z, np.inf)
-    x, y = pictured(x, y, depths, K)
+    x, y = to_pixels(x, y, depths, K)
     return Seen(x, y, z, ahead & (x >= 0) & (y >= 0) & (x < size[0]) & (y < size[1]))

@@ -154,7 +154,7 @@ def project(
     points: Num[np.ndarray, "n 3"], pose: Pose, size: tuple[float, float]
 ) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, "n 2"]] | None:
     """Depths and pixels of world points in a picture of `size`; None where one is not in front."""
-    seen = _seen(points, pose, size)
+    seen = _see(points, pose, size)
     return None if seen.z.min() < NEAREST else (seen.z, np.stack((seen.x, seen.y), 1))
 
 
@@ -163,12 +163,12 @@ def visible(
 ) -> Float[np.ndarray, "m 2 2"]:
     """The pieces between points of a line that lie in front, as pixels (m, start and end, 2) in a picture of
     `size`."""
-    seen = _seen(line, pose, size)
+    seen = _see(line, pose, size)
     pixels, ahead = np.stack((seen.x, seen.y), 1), seen.z >= NEAREST
     return np.stack((pixels[:-1], pixels[1:]), 1)[ahead[:-1] & ahead[1:]]
 
 
-def _seen(points: Num[np.ndarray, "n 3"], pose: Pose, size: tuple[float, float]) -> Seen:
+def _see(points: Num[np.ndarray, "n 3"], pose: Pose, size: tuple[float, float]) -> Seen:
     """Points in the picture of a pose, of whole pixels, one at least."""
     sides = max(round(size[0]), 1), max(round(size[1]), 1)
     return see(points, viewmat(pose), intrinsics(pose, *sides), sides, orthographic=pose.span is not None)

@@ -7,7 +7,7 @@ import torch
 from jaxtyping import Bool, Float, Int, Shaped
 from torch import Tensor
 
-from langflash_core.geometry.pinhole import pictured
+from langflash_core.geometry.pinhole import to_pixels
 
 
 @dataclass(frozen=True)
@@ -72,4 +72,4 @@ def see_points(
     are divided.
     """
     x, y, z = points.unbind(-2)
-    return Projected(*pictured(x, y, z.clamp_min(eps), Ks), z, size)
+    return Projected(*to_pixels(x, y, z.clamp_min(eps), Ks), z, size)

@@ -140,7 +140,16 @@ SHARPENING = Sharpening()
 
 @dataclass(frozen=True)
 class Choice:
-    """Which photos a photo is compared with (`rig.neighbours`)."""
+    """Which photos a photo is matched with (`rig.pairs`), and compared with (`rig.neighbours`)."""
+
+    all_matched: int = 12
+    """Photos up to which every pair is matched."""
+    alike: int = 8
+    """Of each of more photos, the most similar others that it is matched with,"""
+    next: int = 3
+    """and the next in the order in which they were given."""
+    read: int = 15
+    """Photos that each of many reads in the network's decoder."""
 
     sources: int = 4
     """Of each photo, by the angle."""

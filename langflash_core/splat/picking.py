@@ -13,7 +13,7 @@ from jaxtyping import Bool, Float, Int
 from torch import Tensor
 
 from langflash_core.geometry.nearness import Nearness
-from langflash_core.geometry.pinhole import see, unpictured
+from langflash_core.geometry.pinhole import from_pixels, see
 from langflash_core.types import Camera, Gaussians, Scene, Semantics
 
 from .compose import DEPTH, shares
@@ -76,7 +76,7 @@ def _may_touch(
         depths = 1.0 if camera.orthographic else np.maximum(z, 1e-9)
         steep = 0.0
         if not camera.orthographic:
-            reach = np.maximum(-unpictured(np.zeros(2), K), unpictured(np.array(size), K))
+            reach = np.maximum(-from_pixels(np.zeros(2), K), from_pixels(np.array(size), K))
             reach += TAN_MARGIN * 0.5 * np.array(size) / np.diag(K)[:2]
             steep = float(reach @ reach)
         wide = gaussians.scales.cpu().numpy().max(1) / depths * max(K[0, 0], K[1, 1])

@@ -22,7 +22,7 @@ from torch import Tensor
 from langflash_core.geometry.cameras import invert_rigid, unproject
 from langflash_core.geometry.harmonics import colour_to_sh
 from langflash_core.geometry.jumps import towards_nearer
-from langflash_core.geometry.pinhole import unpictured
+from langflash_core.geometry.pinhole import from_pixels
 from langflash_core.geometry.quaternions import matrices_to_quats
 from langflash_core.geometry.surfels import ellipses, spans
 from langflash_core.surface.blocks import Squares, padded
@@ -204,7 +204,7 @@ def placed(
     l11, l21, l22 = elements.roots[..., None].unbind(1)
     axes, deviations = ellipses(span_u * l11 + span_v * l21, span_v * l22)
     thin = _THIN * elements.sides[:, None] * depths[:, None] / K[0, 0]
-    across = unpictured(torch.stack((elements.x, elements.y), -1), K)
+    across = from_pixels(torch.stack((elements.x, elements.y), -1), K)
     pos_c = torch.cat((across, torch.ones_like(depths)[:, None]), -1) * depths[:, None]
     pose = invert_rigid(camera.viewmat)
     return Gaussians(

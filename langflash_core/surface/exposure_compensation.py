@@ -32,12 +32,14 @@ Geman and McClure 1985, sigma lowered step by step as in Black and Rangarajan 19
 import math
 from dataclasses import dataclass
 
+import numpy as np
 import torch
 from jaxtyping import Bool, Float, Int
 from torch import Tensor
 from torch.nn import functional as F
 
 from langflash_core.geometry.cameras import invert_rigid, transform, unproject
+from langflash_core.rig.pairs import strongest
 from langflash_core.rig.rig import Rig
 
 GAIN_RANGE = (0.4, 2.5)
@@ -160,10 +162,10 @@ def compared(rig: Rig) -> Pairs:
     for view in range(num_views):
         _, agrees = _carried(blocks, blocks.points[:, blocks.coarse], rig, view)
         shared[:, view] = (agrees & _confident(blocks.own[..., blocks.coarse])).sum(-1)
-    firsts, seconds = source_pairs(shared)
-    parts = []
-    for view in seconds.unique().tolist():
-        chosen = firsts[seconds == view]
+    both, parts = (shared + shared.T).numpy(), []
+    pairs = strongest(np.where(both > 0, both, -np.inf), SOURCES)
+    for view in sorted({view for pair in pairs for view in pair}):
+        chosen = torch.tensor([sum(pair) - view for pair in pairs if view in pair])
         there, agrees = _carried(blocks, blocks.points[chosen], rig, view)
         own = blocks.own[chosen]
         exposed = (own[:, 3:6] > 0.999) & (there[:, 3:6] > 0.999)
@@ -208,26 +210,6 @@ def _carried(blocks: _Blocks, points: Tensor, rig: Rig, view: int) -> tuple[Tens
 def _confident(own: Tensor) -> Tensor:
     """Blocks (V, P) of maps (V, 8, P) that may speak."""
     return own[:, 7] > CONFIDENT
-
-
-def source_pairs(shared: Int[Tensor, "V V"]) -> tuple[Int[Tensor, " E"], Int[Tensor, " E"]]:
-    """Ordered pairs of photos to compare: each with the `SOURCES` that it shares most with, and what else it
-    takes to connect what shares anything.
-
-    Args:
-        shared: how much of a row's photo a column's photo sees.
-    """
-    both = (shared + shared.T).tolist()
-    part, degrees = list(range(len(both))), [0] * len(both)
-    edges = [(i, j) for j in range(len(both)) for i in range(j) if both[i][j]]
-    chosen = []
-    for i, j in sorted(edges, key=lambda edge: (-both[edge[0]][edge[1]], edge)):
-        if min(degrees[i], degrees[j]) < SOURCES or part[i] != part[j]:
-            chosen += [(i, j), (j, i)]
-            degrees[i], degrees[j] = degrees[i] + 1, degrees[j] + 1
-            part = [part[i] if own == part[j] else own for own in part]
-    firsts, seconds = torch.tensor(chosen, dtype=torch.int64).view(-1, 2).unbind(1)
-    return firsts, seconds
 
 
 def solve_compensation(pairs: Pairs, num_views: int) -> ExposureCompensation:

@@ -17,8 +17,8 @@ from jaxtyping import Bool, Float
 from torch import Tensor
 from torch.nn import functional as F
 
-from langflash_core.geometry.cameras import invert_rigid
-from langflash_core.geometry.nearness import Chosen, Nearness
+from langflash_core.geometry.nearness import Chosen
+from langflash_core.rig.neighbours import beside
 from langflash_core.rig.projected import project_points
 from langflash_core.rig.rig import Rig
 from langflash_core.splat.compose import shares
@@ -58,7 +58,7 @@ def foresight(rig: Rig) -> Foresight:
     found, (height, width) = [], rig.size
     for view, image in enumerate(rig.photos):
         camera = Camera(rig.viewmats[view], rig.Ks[view], width, height)
-        chosen = _beside(rig, view, camera)
+        chosen = beside(rig, view)
         pictures = [
             _pointed(rig.points(other), rig.photos[other].flatten(1), camera) for other in chosen.views
         ]
@@ -66,14 +66,6 @@ def foresight(rig: Rig) -> Foresight:
         alike = _alike(picture, F.avg_pool2d(image, CELL), shown)
         found.append((float(shown.float().mean()), alike, chosen.views[0]))
     return Foresight(*(tuple(column) for column in zip(*found, strict=True)))
-
-
-def _beside(rig: Rig, view: int, camera: Camera) -> Chosen:
-    """The other photos that a picture at a photo's place would be drawn from."""
-    poses = invert_rigid(rig.viewmats.double()).cpu().numpy()
-    others = [other for other in range(len(rig)) if other != view]
-    distance = float(rig.depths[view].nanmedian())
-    return Nearness(poses[others, :3, 3], poses[others, :3, 2], distance, tuple(others)).chosen(camera)
 
 
 def _blended(

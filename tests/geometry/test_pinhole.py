@@ -5,7 +5,7 @@ import pytest
 import torch
 
 from langflash_core.geometry.cameras import intrinsics_from_fov
-from langflash_core.geometry.pinhole import see, unpictured
+from langflash_core.geometry.pinhole import from_pixels, see
 from langflash_core.rig.projected import project_points
 from tests.geometry.twins import seen_at
 
@@ -52,6 +52,6 @@ def test_parallel_rays_divide_by_nothing():
 
 def test_back_from_pixels():
     pixels = torch.tensor([[0.0, 0.0], [20.5, 3.0]], dtype=torch.float64)
-    rays = torch.cat((unpictured(pixels, K), torch.ones(2, 1)), 1)
+    rays = torch.cat((from_pixels(pixels, K), torch.ones(2, 1)), 1)
     assert torch.allclose(seen_at(3 * rays, K), pixels, atol=1e-12)  # rounding of tens
-    assert np.array_equal(unpictured(pixels.numpy(), K.numpy()), rays[:, :2])
+    assert np.array_equal(from_pixels(pixels.numpy(), K.numpy()), rays[:, :2])

@@ -22,7 +22,6 @@ from langflash_core.surface.exposure_compensation import (
     ExposureCompensation,
     Pairs,
     solve_compensation,
-    source_pairs,
 )
 from tests.scene.plane import wall_prediction
 from tests.torch_threads import torch_threads
@@ -387,25 +386,6 @@ def test_equal_photos_give_equal_bits_and_the_input_stays():
     assert torch.equal(first.gains, second.gains) and torch.equal(first.offsets, second.offsets)
     assert first.gains.dtype == torch.float64
     assert all(torch.equal(a, b) for a, b in zip(photos, copies, strict=True))
-
-
-def test_partners_are_those_that_share_most_and_connect_all():
-    generator = torch.Generator().manual_seed(0)
-    shared = torch.randint(1, 100, (20, 20), generator=generator)
-    shared[:10, 10:] = shared[10:, :10] = 0
-    shared[3, 14] = 1
-    firsts, seconds = source_pairs(shared)
-    found = set(zip(firsts.tolist(), seconds.tolist(), strict=True))
-    assert len(found) == len(firsts) <= 2 * 20 * module.SOURCES
-    assert all((b, a) in found for a, b in found) and (3, 14) in found
-    both = shared + shared.T
-    for view in range(20):
-        best = [j for j in both[view].argsort(descending=True).tolist() if j != view][: module.SOURCES]
-        assert all(
-            (view, other) in found for other in best if both[view, other] > both[view].sort().values[-6]
-        )
-    none = source_pairs(torch.zeros(3, 3, dtype=torch.int64))
-    assert len(none[0]) == 0
 
 
 def test_light_is_refused_where_its_shape_is_wrong_and_corrects_one_or_all(unchecked):

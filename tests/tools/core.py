@@ -28,12 +28,13 @@ IRREGULAR = re.compile(
     "laid|led|left|lit|lost|made|meant|met|put|read|said|seen|sent|set|shown|sought|spent|split|spoken|spread|"
     "stood|swept|taken|taught|thought|told|torn|understood|woven|written"
 )
-PROJECTING = tuple(f"{CORE}.geometry.{name}" for name in ("cameras.project", "pinhole.pictured"))
+PROJECTING = tuple(f"{CORE}.geometry.{name}" for name in ("cameras.project", "pinhole.to_pixels"))
 CHOOSING = re.compile(
     r"list\[(int|list\[int\]|tuple\[int, int\])\]|tuple\[tuple\[int, \.\.\.\], \.\.\.\]|"
     r"Neighbours|Chosen|tuple\[Int\[Tensor, ' E'\], Int\[Tensor, ' E'\]\]"
 )
-OF_PHOTOS = {"viewmats", "num_views", "descriptors", "shared", "counts", "worth", "camera", "view", "rig"}
+OF_A_PHOTO = {"camera", "view"}
+OF_PHOTOS = OF_A_PHOTO | {"viewmats", "num_views", "descriptors", "shared", "counts", "worth", "rig"}
 
 
 def modules(checkout: Path) -> dict[str, ast.Module]:
@@ -118,9 +119,12 @@ def is_reprojection(function: ast.AST, known: dict[str, str]) -> bool:
 
 
 def is_neighbour_rule(function: ast.FunctionDef | ast.AsyncFunctionDef) -> bool:
+    """It gives one list of photos and is asked about a photo, or pairs, or a list for each; a list that is
+    of all photos, such as their order, is none."""
     returns = ast.unparse(function.returns) if function.returns else ""
     given = {one.arg for one in (*function.args.args, *function.args.kwonlyargs)}
-    return bool(CHOOSING.fullmatch(returns)) and bool(given & OF_PHOTOS)
+    asked = OF_A_PHOTO if returns == "list[int]" else OF_PHOTOS
+    return bool(CHOOSING.fullmatch(returns)) and bool(given & asked)
 
 
 def is_bare_participle(name: str) -> bool:
