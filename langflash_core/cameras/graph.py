@@ -20,10 +20,6 @@ from langflash_core.rig.settings import GRAPH, Graph
 Pairs = Mapping[tuple[int, int], RelativePose]
 """Relative poses by views i < j."""
 
-_TURN_SIGMA, _SHIFT_SIGMA, _SCALE_SIGMA = np.radians(0.3), 0.03, 0.1
-"""Errors that matches of a pair share, so that no number of them removes it: radians, scene units per unit
-of depth, log scale."""
-
 
 @dataclass(frozen=True)
 class Placed:
@@ -133,8 +129,8 @@ def gap(
 def _precision(pose: RelativePose) -> np.ndarray:
     """Inverse covariance (7, 7) of an edge: (L^-1 + S)^-1 with L the information of its matches and S what
     they share. In units of S it is L (L + 1)^-1, also where the matches say nothing of a direction."""
-    shift = _SHIFT_SIGMA * (0.1 + np.linalg.norm(pose.translation))
-    sigmas = np.array([_TURN_SIGMA] * 3 + [shift] * 3 + [_SCALE_SIGMA])
+    shift = GRAPH.shift_sigma * (0.1 + np.linalg.norm(pose.translation))
+    sigmas = np.array([np.radians(GRAPH.turn_sigma)] * 3 + [shift] * 3 + [GRAPH.scale_sigma])
     units = np.outer(sigmas, sigmas)
     values, axes = np.linalg.eigh(pose.information * units)
     values = values.clip(0)  # rounding

@@ -6,12 +6,10 @@ import numpy as np
 from jaxtyping import Float
 
 from langflash_core.cameras.dense import match_cells
-from langflash_core.cameras.keypoints import WORKING_SIDE, KeyPoints
+from langflash_core.cameras.keypoints import KeyPoints
 from langflash_core.cameras.matching import Matches
 from langflash_core.geometry.pinhole import from_pixels, to_pixels
-
-DENSE_SIGMA = 3.0
-"""Pixels at the working size: a third of a cell."""
+from langflash_core.rig.settings import MATCHING
 
 
 @dataclass(frozen=True)
@@ -56,7 +54,7 @@ def dense_matches(view_i: PoseInput, view_j: PoseInput) -> Matches:
         from_pixels(cells * (np.array(view.size) / view.local.shape[:0:-1]), view.K)
         for view, cells in ((view_i, cells_i), (view_j, cells_j))
     )
-    return Matches(x_i, x_j, normalised_sigma(view_j, DENSE_SIGMA), np.full((len(x_i), 2), -1))
+    return Matches(x_i, x_j, normalised_sigma(view_j, MATCHING.dense_sigma), np.full((len(x_i), 2), -1))
 
 
 def with_dense(exact: Matches, dense: Matches) -> Matches:
@@ -67,12 +65,12 @@ def with_dense(exact: Matches, dense: Matches) -> Matches:
 
 def normalised_sigma(view: PoseInput, pixels: float) -> float:
     """`pixels` at the working size, as normalised coordinates."""
-    return pixels * max(view.size) / WORKING_SIDE / view.K[0, 0]
+    return pixels * max(view.size) / MATCHING.working_side / view.K[0, 0]
 
 
 def without_camera(pixels: Float[np.ndarray, "n 2"], view: PoseInput) -> Float[np.ndarray, "n 2"]:
-    """Pixels of a picture whose longer side is `WORKING_SIDE` -> normalised coordinates (n, 2)."""
-    return from_pixels(pixels * (max(view.size) / WORKING_SIDE), view.K)
+    """Pixels of a picture whose longer side is `MATCHING.working_side` -> normalised coordinates (n, 2)."""
+    return from_pixels(pixels * (max(view.size) / MATCHING.working_side), view.K)
 
 
 def depths_at(view: PoseInput, x: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, " n"]:

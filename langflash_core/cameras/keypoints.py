@@ -12,17 +12,14 @@ from jaxtyping import Float, Int, Shaped, UInt8
 from langflash_core.cameras.matching import detect, match_descriptors
 from langflash_core.cameras.retrieval import likeness
 from langflash_core.rig.pairs import likely_pairs
+from langflash_core.rig.settings import MATCHING
 
 Told = Callable[[str, int, int], None]
-
-WORKING_SIDE = 768  # pixels of the longer side at which photos are matched
-_MANY_VIEWS = 4  # beyond this, fewer features keep the pairs affordable
-_FEATURES = {True: 1500, False: 4000}  # of many views, of few
 
 
 @dataclass(frozen=True)
 class KeyPoints:
-    """positions: per view (n, 2), pixels of the photo scaled to `WORKING_SIDE`. pairs: per pair of
+    """positions: per view (n, 2), pixels of the photo scaled to `MATCHING.working_side`. pairs: per pair of
     views i < j that may show the same, rows of both (m, 2) that correspond."""
 
     positions: tuple[Float[np.ndarray, "_ 2"], ...]
@@ -89,7 +86,7 @@ def match_photos(
     `check` is called before each photo and each pair; what it raises ends the work. So is `told`, with what
     is done, how much of it was, and of how much.
     """
-    limit = _FEATURES[len(greys) > _MANY_VIEWS]
+    limit = MATCHING.features_of_many if len(greys) > MATCHING.many else MATCHING.features
     positions, descriptors = [], []
     for number, grey in enumerate(greys):
         check()
@@ -114,7 +111,7 @@ def decoded(source: bytes) -> UInt8[np.ndarray, "h w"]:
 
 def _working_size(grey: np.ndarray) -> np.ndarray:
     """Small pictures are enlarged: SIFT needs pixels to find more than a handful of points."""
-    ratio = WORKING_SIDE / max(grey.shape)
+    ratio = MATCHING.working_side / max(grey.shape)
     if ratio == 1:
         return grey
     method = cv2.INTER_CUBIC if ratio > 1 else cv2.INTER_AREA

@@ -8,7 +8,6 @@ from jaxtyping import Float
 
 from langflash_core.base.records import FoundFocal
 from langflash_core.cameras.adjustment import (
-    FEWEST,
     Adjusted,
     Agreed,
     Sought,
@@ -28,14 +27,13 @@ from langflash_core.cameras.inputs import (
 from langflash_core.cameras.keypoints import KeyPoints
 from langflash_core.cameras.known import agreeing, depth_scales, doubt, explained, log_scales
 from langflash_core.cameras.matching import (
-    MIN_INLIERS,
     Matches,
     RelativePose,
     relative_pose,
     triangulate,
 )
 from langflash_core.rig.pairs import bridges, scores_of, strongest
-from langflash_core.rig.settings import PAIRING, Pairing
+from langflash_core.rig.settings import ADJUSTMENT, MATCHING, PAIRING, Pairing
 
 
 @dataclass(frozen=True)
@@ -96,7 +94,7 @@ def estimate_poses(
     num_views = len(views)
     told = {edge: rows for edge, rows in points.pairs.items() if not _blank(points, edge)}
     points = replace(points, pairs=told)
-    if known is None and num_views >= FEWEST:
+    if known is None and num_views >= ADJUSTMENT.fewest:
         return _together(views, points, sought or given_lenses(num_views), check, settings=settings)
     edges = _edges(views, points, settings=settings)
     if known is None:
@@ -282,7 +280,7 @@ def _of_adjusted(
 def _blank(points: KeyPoints, edge: tuple[int, int]) -> bool:
     """Whether one of two photos shows nothing to tell places by: dense matches are its borders then, which
     agree with those of any photo."""
-    return min(len(points.positions[view]) for view in edge) < MIN_INLIERS
+    return min(len(points.positions[view]) for view in edge) < MATCHING.fewest
 
 
 def _pair_poses(

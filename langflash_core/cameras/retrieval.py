@@ -11,8 +11,7 @@ import numpy as np
 from jaxtyping import Float
 
 from langflash_core.rig.pairs import Scores
-
-_WORDS, _SAMPLES, _ROUNDS = 64, 8000, 8
+from langflash_core.rig.settings import RETRIEVAL
 
 
 def likeness(descriptors: Sequence[Float[np.ndarray, "_ C"]]) -> Scores:
@@ -45,11 +44,11 @@ def _vectors(descriptors: Sequence[np.ndarray]) -> np.ndarray:
 def _words(descriptors: Sequence[np.ndarray]) -> np.ndarray:
     """Means (W, C) of clusters, by Lloyd's rounds over evenly chosen descriptors; the same every time."""
     every = np.concatenate(descriptors)
-    chosen = every[np.linspace(0, len(every) - 1, min(_SAMPLES, len(every))).astype(int)]
+    chosen = every[np.linspace(0, len(every) - 1, min(RETRIEVAL.samples, len(every))).astype(int)]
     if len(chosen) == 0:
         return np.zeros((1, every.shape[1]), np.float32)
-    words = chosen[np.linspace(0, len(chosen) - 1, min(_WORDS, len(chosen))).astype(int)].copy()
-    for _ in range(_ROUNDS):
+    words = chosen[np.linspace(0, len(chosen) - 1, min(RETRIEVAL.words, len(chosen))).astype(int)].copy()
+    for _ in range(RETRIEVAL.rounds):
         nearest = _nearest(chosen, words)
         for word in range(len(words)):
             own = chosen[nearest == word]

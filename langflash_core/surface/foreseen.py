@@ -22,12 +22,10 @@ from langflash_core.rig.neighbours import beside
 from langflash_core.rig.projected import project_points
 from langflash_core.rig.rig import Rig
 from langflash_core.splat.compose import shares
+from langflash_core.surface.settings import FORESEEING
 from langflash_core.types import Camera
 
-CELL = 3
-"""Pixels a side: a neighbour up to three times as far away still leaves a point in each."""
-_FRONT = 0.1  # of the depth behind the nearest point of a cell, within which others are its surface, too
-_GREY = (0.299, 0.587, 0.114)
+CELL = FORESEEING.cell
 
 
 @dataclass(frozen=True)
@@ -88,7 +86,7 @@ def _pointed(
     some = there.inside.nonzero()[:, 0]
     z, places = there.z[some], there.y[some].long() // CELL * width + there.x[some].long() // CELL
     nearest = z.new_full((height * width,), torch.inf).scatter_reduce(0, places, z, "amin")
-    front = z < (1 + _FRONT) * nearest[places]
+    front = z < (1 + FORESEEING.front) * nearest[places]
     some, places = some[front], places[front]
     sums = z.new_zeros(3, height * width).index_add_(1, places, colours[:, some])
     counts = torch.bincount(places, minlength=height * width).clamp_min(1)
@@ -100,7 +98,8 @@ def _alike(
 ) -> float | None:
     """Correlation of the differences of grey from cell to cell, across and down, where both are shown: light
     and contrast do not matter; None where one has none."""
-    greys = torch.einsum("c,pchw->phw", picture.new_tensor(_GREY), torch.stack((picture, photo))).double()
+    grey = picture.new_tensor(FORESEEING.grey)
+    greys = torch.einsum("c,pchw->phw", grey, torch.stack((picture, photo))).double()
     across = greys.diff(dim=2)[:, shown[:, 1:] & shown[:, :-1]]
     down = greys.diff(dim=1)[:, shown[1:] & shown[:-1]]
     ours, theirs = torch.cat((across, down), 1)

@@ -17,6 +17,7 @@ from langflash_core.cameras.graph import (
     placed,
 )
 from langflash_core.cameras.matching import RelativePose
+from langflash_core.rig.settings import GRAPH
 
 INFORMATION = np.diag([4e6] * 3 + [4e4] * 3 + [400.0])
 
@@ -66,8 +67,8 @@ def test_exact_edges_give_the_exact_places():
 def test_an_edge_knows_what_its_matches_know_and_never_more_than_they_share():
     rng = np.random.default_rng(3)
     pose = _edge(_matrix([0.1, 0.2, 0.3], [0.4, 0.0, 0.1]))
-    shift = graph._SHIFT_SIGMA * (0.1 + np.linalg.norm(pose.translation))
-    shared = np.diag(np.array([graph._TURN_SIGMA] * 3 + [shift] * 3 + [graph._SCALE_SIGMA]) ** 2)
+    shift = GRAPH.shift_sigma * (0.1 + np.linalg.norm(pose.translation))
+    shared = np.diag(np.array([np.radians(GRAPH.turn_sigma)] * 3 + [shift] * 3 + [GRAPH.scale_sigma]) ** 2)
     root = rng.normal(size=(7, 7)) * [1e3, 1e3, 1e3, 1e2, 1e2, 1e2, 10]
     known = replace(pose, information=root.T @ root + np.eye(7))
     twin = np.linalg.inv(np.linalg.inv(known.information) + shared)
