@@ -75,6 +75,6 @@ def without_camera(pixels: Float[np.ndarray, "n 2"], view: PoseInput) -> Float[n
 
 def depths_at(view: PoseInput, x: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, " n"]:
     """z (n,) of the monocular map at normalised coordinates (n, 2)."""
-    pixels = np.array(to_pixels(*x.T, 1.0, view.K)).astype(int)
+    pixels = np.array(to_pixels(x[:, 0], x[:, 1], 1.0, view.K)).astype(int)
     columns, rows = np.clip(pixels, 0, np.array(view.size)[:, None] - 1)
     return view.depth[rows, columns].astype(np.float64)

@@ -13,7 +13,7 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
-from langflash_core.geometry.jumps import steps_along, towards_nearer
+from langflash_core.geometry.surfels import steps_along, towards_nearer
 from langflash_core.network.settings import OCCLUSION
 
 

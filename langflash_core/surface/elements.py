@@ -21,10 +21,9 @@ from torch import Tensor
 
 from langflash_core.geometry.cameras import invert_rigid, unproject
 from langflash_core.geometry.harmonics import colour_to_sh
-from langflash_core.geometry.jumps import towards_nearer
 from langflash_core.geometry.pinhole import from_pixels
 from langflash_core.geometry.quaternions import matrices_to_quats
-from langflash_core.geometry.surfels import ellipses, spans
+from langflash_core.geometry.surfels import ellipses, spans, towards_nearer
 from langflash_core.surface.blocks import Squares, padded
 from langflash_core.surface.settings import COVERING, UPSAMPLING
 from langflash_core.surface.upsampling import Upsampled

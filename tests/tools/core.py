@@ -9,7 +9,8 @@ Read as text: nothing of a checkout is imported. The lab is left out. What is co
 - neighbour rules: functions that choose photos for a photo, or pairs of photos
 - bare participles: functions whose name is one (`told`, `blended`)
 - rooms, returns: modules that `pipeline.reconstruct` gets into by calls, in the order of the source, each
-  function once; and how often it gets into one that it had left
+  function once; and how often it gets into one that it had left. A method that one class alone has is that
+  one's where the module that calls imports its module, itself or through others
 """
 
 import argparse
@@ -152,7 +153,17 @@ class Walk:
         for path in self._bodies:
             if path.count(".") and path.rsplit(".", 1)[0] in self._classes:
                 self._methods.setdefault(path.rsplit(".", 1)[1], []).append(path)
+        self._near = {m: self._reached(m, set()) for m in trees}
         self._visited, self.entered = set[str](), list[str]()
+
+    def _reached(self, module: str, found: set[str]) -> set[str]:
+        """Modules that one imports, itself or through others, added to those found."""
+        for path in self._known.get(module, {}).values():
+            for other in (path, path.rpartition(".")[0]):
+                if other in self._known and other not in found:
+                    found.add(other)
+                    self._reached(other, found)
+        return found
 
     def follow(self, path: str) -> None:
         if path in self._visited or path not in self._bodies:
@@ -174,7 +185,8 @@ class Walk:
         if isinstance(called, ast.Attribute):
             own = self._methods.get(called.attr, [])
             near = [path for path in own if path.startswith(f"{module}.")]
-            return near or (own if len(own) == 1 else [])
+            alone = len(own) == 1 and self._bodies[own[0]][0] in self._near[module]
+            return near or (own if alone else [])
         return []
 
     @property
