@@ -1,5 +1,7 @@
 """What is counted of the core: each kind is seen where it is, and nothing else is taken for it."""
 
+from pathlib import Path
+
 from tests.tools.core import counts
 
 PIPELINE = """
@@ -20,7 +22,11 @@ SIZES: tuple = (1.5, -3)
 HELD = None
 
 def helped(values, few=4):
-    return turned(values * 7)
+    return turned(values * 7).lift()
+"""
+FAR = """
+class Lifter:  # who lifts is not known to be one: nobody on the way imports it
+    def lift(self): ...
 """
 DEEP = """
 from langflash_core.geometry.cameras import project as seen_at
@@ -32,11 +38,19 @@ def turned(points, K, R):
     return points @ R / points[2] * K[0, 0] + K[0, 2]
 
 def near(view, viewmats) -> list[int]: ...
+def pairs(viewmats) -> list[tuple[int, int]]: ...
+def order(viewmats) -> list[int]: ...
 """
 
 
 def test_each_kind_is_counted(tmp_path):
-    for path, text in {"pipeline": PIPELINE, "other": OTHER, "deep": DEEP, "lab/train": OTHER}.items():
+    for path, text in {
+        "pipeline": PIPELINE,
+        "other": OTHER,
+        "deep": DEEP,
+        "far": FAR,
+        "lab/train": OTHER,
+    }.items():
         file = tmp_path / "langflash_core" / f"{path}.py"
         file.parent.mkdir(parents=True, exist_ok=True)
         file.write_text(text)
@@ -44,10 +58,10 @@ def test_each_kind_is_counted(tmp_path):
     of = {name: list(held) for name, held in found.items() if isinstance(held, list)}
     core = "langflash_core"
     assert of["numbers named in modules"] == [f"{core}.other._TWO", f"{core}.other.SIZES"]
-    assert found["numbers in bodies, but 0, 1, 2"] == 1 and found["functions"] == 6
-    assert of["modules at the root"] == ["deep", "other", "pipeline"]
+    assert found["numbers in bodies, but 0, 1, 2"] == 1 and found["functions"] == 9
+    assert of["modules at the root"] == ["deep", "far", "other", "pipeline"]
     assert of["reprojections"] == [f"{core}.deep.look", f"{core}.deep.turned"]
-    assert of["neighbour rules"] == [f"{core}.deep.near"]
+    assert of["neighbour rules"] == [f"{core}.deep.near", f"{core}.deep.pairs"]
     assert of["bare participles"] == [
         f"{core}.deep.turned",
         f"{core}.other.helped",
@@ -55,3 +69,22 @@ def test_each_kind_is_counted(tmp_path):
     ]
     assert of["rooms"] == [f"{core}.deep", f"{core}.other", f"{core}.pipeline"]
     assert found["returns"] == 2  # back into deep from other, and back to the pipeline's own class
+
+
+GEOMETRY = "rig cameras depth surface geometry reconstruction network"
+
+
+def test_the_way_of_a_photo_says_each_thing_once():
+    """Where points lie in a photo, and which photos go together, is said in `geometry.pinhole` and `rig`: but
+    for a look-up in normalised coordinates, the layers that a camera sees, and who holds points of a photo.
+    Numbers that decide something are in records: at most 70 names outside, most of them sizes of nets."""
+    found = counts(Path(__file__).parents[1])
+    assert found["reprojections"] == ["langflash_core.cameras.inputs.depths_at"]
+    assert found["neighbour rules"] == [
+        "langflash_core.geometry.nearness.Nearness.chosen",
+        "langflash_core.surface.view_selection._holders",
+    ]
+    names = found["numbers named in modules"]
+    assert isinstance(names, list)
+    own = [name for name in names if name.split(".")[1] in GEOMETRY.split() and ".semantics." not in name]
+    assert len(own) <= 70

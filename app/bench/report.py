@@ -8,7 +8,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from langflash_core.language.relevance import CompiledQuery
-from langflash_core.surface.prune import CUT
+from langflash_core.surface.settings import PRUNING
 
 from .cases import Case
 from .errors import Errors
@@ -94,7 +94,7 @@ def _scene(case: Case) -> dict:
         "channels": semantics.dictionary.shape[1],
         "rank": case.compiled.factor.shape[1],
         "weights_per_gaussian": semantics.weight_ids.shape[1],
-        "weights_above_cut": round(float((semantics.weight_values >= CUT).sum(-1).float().mean()), 3),
+        "weights_above_cut": round(float((semantics.weight_values >= PRUNING.cut).sum(-1).float().mean()), 3),
         "sh_bases": gaussians.sh.shape[1],
         "space": semantics.space,
         "notes": list(case.notes),

@@ -5,7 +5,7 @@ import numpy as np
 from torch import Tensor
 
 from langflash_core.language.answers import COVERED_ALPHA
-from langflash_core.surface.consistency import TOLERANCE
+from langflash_core.surface.settings import CONSISTENCY
 from langflash_core.types import Camera, Scene
 
 from .colour import draw_colour
@@ -16,7 +16,7 @@ from .targets import ColourTarget
 SAME = 0.05
 """Relative depth within which a photo shows the very surface: a pixel of 1/200 of the focal length on a floor
 seen at 80 degrees from upright spans 0.03."""
-WORST = TOLERANCE
+WORST = CONSISTENCY.tolerance
 """Relative depth from which the depths of two photos disagree altogether."""
 MOST_PHOTOS = 32  # matrices of so many fit any driver's uniforms
 LONGEST_SIDE = 320  # pixels of a depth map

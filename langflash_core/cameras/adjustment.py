@@ -22,14 +22,11 @@ from langflash_core.cameras.inputs import (
     normalised_sigma,
     without_camera,
 )
-from langflash_core.cameras.keypoints import WORKING_SIDE, KeyPoints
+from langflash_core.cameras.keypoints import KeyPoints
 from langflash_core.cameras.known import agreeing
-from langflash_core.cameras.matching import MIN_INLIERS, Matches
+from langflash_core.cameras.matching import Matches
 from langflash_core.cameras.tracks import Tracks, joined, no_tracks, thinned, with_pairs
-from langflash_core.rig.settings import ADJUSTMENT, Adjustment
-
-FEWEST = 3
-"""Photos of one lens from which it is sought, and photos from which all are adjusted together."""
+from langflash_core.rig.settings import ADJUSTMENT, MATCHING, Adjustment
 
 Agreed = dict[tuple[int, int], Matches]
 
@@ -90,10 +87,10 @@ def adjusted_photos(
         agreed: matches of pairs that agree with `start`. check: called between steps.
     """
     placed = [v for v in range(len(views)) if v not in start.missing]
-    if len(placed) < FEWEST:
+    if len(placed) < ADJUSTMENT.fewest:
         return None
     counts = np.bincount(np.array(sought.lenses)[placed], minlength=len(sought.doubts))
-    doubts = np.where(counts >= FEWEST, np.array(sought.doubts), 0.0)
+    doubts = np.where(counts >= ADJUSTMENT.fewest, np.array(sought.doubts), 0.0)
     while True:
         adjusted = _adjusted(
             list(views), points, start, agreed, np.array(sought.lenses), doubts, check, settings=settings
@@ -164,7 +161,7 @@ def _with_bends(
     for view, lens in zip(views, lenses, strict=True):
         focal = view.K[0, 0] * np.exp(bent.growths[lens])
         corners[lens] = max(corners[lens], np.hypot(*view.size) / 2 / focal)
-    diagonal = WORKING_SIDE * np.hypot(*views[0].size) / max(views[0].size)
+    diagonal = MATCHING.working_side * np.hypot(*views[0].size) / max(views[0].size)
     moved = np.abs(bent.bends) * corners**2 * diagonal / 2
     shown = (np.abs(bent.bends) > settings.bend_sure * errors) & (moved > settings.bend_seen)
     shown &= 1 + 3 * bent.bends * corners**2 > settings.steepest
@@ -258,11 +255,11 @@ def _agreeing(
             continue
         if (i, j) in agreed and (agreed[i, j].key_points[:, 0] < 0).any():
             found[i, j] = _through(agreed[i, j], growths[i], growths[j])
-        elif len(points.pairs[i, j]) >= MIN_INLIERS:
+        elif len(points.pairs[i, j]) >= MATCHING.fewest:
             own = _through(key_point_matches(views, points, i, j), growths[i], growths[j])
             wide = replace(own, sigma=own.sigma * settings.agrees)
             own = replace(agreeing(wide, viewmats[j] @ np.linalg.inv(viewmats[i])), sigma=own.sigma)
-            if len(own) >= MIN_INLIERS // 2:
+            if len(own) >= MATCHING.fewest // 2:
                 found[i, j] = own
     return found
 

@@ -17,7 +17,6 @@ from jaxtyping import Float
 from langflash_core.rig.settings import STRAIGHTENING, Straightening
 
 _PRIOR_SIGMAS = np.array([0.5, 0.05, 0.05, 0.05])  # what is expected of b without any match
-INDEPENDENT = 50  # errors of one map go together: all its matches count as this many
 
 
 @dataclass(frozen=True)
@@ -62,7 +61,7 @@ def fit_correction(
     mean = float(log_priors.mean())
     design = np.column_stack((np.ones(len(x)), x, log_priors - mean))
     inverse_sigma = 1 / np.hypot(sigmas, settings.prior_error)
-    share = min(1.0, INDEPENDENT / len(x))
+    share = min(1.0, STRAIGHTENING.independent / len(x))
     ridge = np.diag(1 / _PRIOR_SIGMAS**2)
     coefficients = np.zeros(4)
     for _ in range(settings.iterations):

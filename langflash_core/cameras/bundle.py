@@ -16,18 +16,8 @@ import scipy.sparse
 from jaxtyping import Float, Int
 
 from langflash_core.cameras.tracks import Tracks
+from langflash_core.rig.settings import BUNDLE, MATCHING
 
-_DEPTH_SIGMA, _SCALE_SIGMA = 0.25, 0.3  # as in `matching`: of a map's log depths, of its log scale
-_INDEPENDENT = 1
-"""Observations as which all of a map count: many views know depths themselves. On four walks of 4 and 8
-photos the turns were wrong by .15, .11, .53, 1.0 degrees with 1, by .13, .38, .75, 4.0 with a pair's 20."""
-_CAUCHY = 2.0  # sigmas
-_OUTLIER = 4.0  # sigmas beyond which an observation is none
-_ITERATIONS, _ROUNDS = 25, 2
-_CONVERGED, _NEARLY = 1e-4, 1e-3
-"""Share of the cost below which a step's gain ends the search: at last, and before outliers are left out."""
-_DAMPED = 1e-2  # damping above which a small gain says nothing of what is left
-_NEARER = 0.3  # a step leaves each point this share of its depth, in any camera
 _POSE = 7  # turn, shift, log scale of the depth map
 
 
@@ -93,7 +83,7 @@ class _Problem:
     @staticmethod
     def of(optics: Optics, tracks: Tracks, log_depths: np.ndarray) -> "_Problem":
         counts = np.bincount(tracks.views, minlength=len(optics.focals))
-        shares = np.minimum(1.0, _INDEPENDENT / np.maximum(counts, 1))[tracks.views]
+        shares = np.minimum(1.0, BUNDLE.independent / np.maximum(counts, 1))[tracks.views]
         return _Problem(optics, tracks, log_depths, shares)
 
     @property
@@ -143,8 +133,8 @@ def adjusted_bundle(
     problem = _Problem.of(optics, tracks, log_depths)
     state = _State(viewmats, logs, np.zeros((0, 3)), growths, np.zeros_like(growths))
     state = replace(state, points=_first_points(state, problem))
-    for left in reversed(range(_ROUNDS)):
-        state = _solved(state, problem, _NEARLY if left else _CONVERGED)
+    for left in reversed(range(BUNDLE.rounds)):
+        state = _solved(state, problem, BUNDLE.nearly if left else BUNDLE.converged)
         if left:
             state, problem = _without_outliers(state, problem)
     spread, errors, unsure = _errors(state, problem)
@@ -156,7 +146,7 @@ def adjusted_bundle(
 
 def _solved(state: _State, problem: _Problem, converged: float) -> _State:
     damping, cost = 1e-3, _cost(state, problem)
-    for _ in range(_ITERATIONS):
+    for _ in range(BUNDLE.iterations):
         system, gain = _System.of(state, problem), 0.0
         while gain <= 0 and damping < 1e8:
             trial = _moved(state, problem, *_step(problem, system, damping))
@@ -165,7 +155,7 @@ def _solved(state: _State, problem: _Problem, converged: float) -> _State:
         if not gain > 0:
             break
         state, cost = trial, cost - gain
-        if gain < converged * cost and damping < _DAMPED:
+        if gain < converged * cost and damping < BUNDLE.damped:
             break
     return state
 
@@ -179,7 +169,7 @@ def _first_points(state: _State, problem: _Problem) -> np.ndarray:
     depths = np.exp(problem.log_depths + state.logs[tracks.views])
     directions = rays / np.linalg.norm(rays, axis=1, keepdims=True)
     across = (depths * tracks.sigmas / focals[:, 0])[:, None, None] ** -2.0
-    along = (depths * 2 * _DEPTH_SIGMA)[:, None, None] ** -2.0
+    along = (depths * 2 * MATCHING.depth_sigma)[:, None, None] ** -2.0
     known = across * (np.eye(3) - directions[:, :, None] * directions[:, None]) + along * np.eye(3)
     precision = rotations.transpose(0, 2, 1) @ known @ rotations
     seen = np.einsum("mji,mj->mi", rotations, rays * depths[:, None] - shifts)
@@ -207,25 +197,25 @@ def _residuals(state: _State, problem: _Problem) -> np.ndarray:
     bent = 1 + problem.bends(state) * (pos[:, :2] ** 2).sum(1) / z**2
     scale = problem.focals(state) / z * bent
     reprojection = scale[:, None] * pos[:, :2] - tracks.pixels / tracks.sigmas[:, None]
-    depth = (np.log(z) - problem.log_depths - state.logs[tracks.views]) / _DEPTH_SIGMA
+    depth = (np.log(z) - problem.log_depths - state.logs[tracks.views]) / MATCHING.depth_sigma
     return np.column_stack((reprojection, depth))
 
 
 def _weights(residuals: np.ndarray, problem: _Problem) -> np.ndarray:
     """Cauchy's, (M, 3)."""
-    seen = 1 / (1 + (residuals[:, :2] ** 2).sum(1) / _CAUCHY**2)
-    return np.column_stack((seen, seen, problem.shares / (1 + (residuals[:, 2] / _CAUCHY) ** 2)))
+    seen = 1 / (1 + (residuals[:, :2] ** 2).sum(1) / BUNDLE.cauchy**2)
+    return np.column_stack((seen, seen, problem.shares / (1 + (residuals[:, 2] / BUNDLE.cauchy) ** 2)))
 
 
 def _cost(state: _State, problem: _Problem) -> float:
     """Twice minus the log posterior over c^2, but for a constant."""
     residuals = _residuals(state, problem)
-    seen = np.log1p((residuals[:, :2] ** 2).sum(1) / _CAUCHY**2).sum()
-    depth = (problem.shares * np.log1p((residuals[:, 2] / _CAUCHY) ** 2)).sum()
+    seen = np.log1p((residuals[:, :2] ** 2).sum(1) / BUNDLE.cauchy**2).sum()
+    depth = (problem.shares * np.log1p((residuals[:, 2] / BUNDLE.cauchy) ** 2)).sum()
     doubts = problem.optics.lens_doubts
     known = doubts > 0
     lens = ((state.lenses[known] / doubts[known]) ** 2).sum()
-    return float(seen + depth + ((state.logs**2).sum() / _SCALE_SIGMA**2 + lens) / _CAUCHY**2)
+    return float(seen + depth + ((state.logs**2).sum() / MATCHING.scale_sigma**2 + lens) / BUNDLE.cauchy**2)
 
 
 def _jacobians(state: _State, problem: _Problem) -> tuple[np.ndarray, np.ndarray]:
@@ -245,11 +235,11 @@ def _jacobians(state: _State, problem: _Problem) -> tuple[np.ndarray, np.ndarray
     to_pos[:, 0, 0] += scale
     to_pos[:, 1, 1] += scale
     to_pos[:, :2, 2] = -pos[:, :2] * (scale / z)[:, None] - q * (more * squares)[:, None]
-    to_pos[:, 2, 2] = 1 / (z * _DEPTH_SIGMA)
+    to_pos[:, 2, 2] = 1 / (z * MATCHING.depth_sigma)
     to_camera = np.zeros((len(z), 3, _POSE + 2))
     to_camera[:, :, :3] = np.cross(turned[:, None], to_pos)
     to_camera[:, :, 3:6] = to_pos
-    to_camera[:, 2, 6] = -1 / _DEPTH_SIGMA
+    to_camera[:, 2, 6] = -1 / MATCHING.depth_sigma
     to_camera[:, :2, 7] = pos[:, :2] * scale[:, None]
     to_camera[:, :2, 8] = q * (focals * squares)[:, None]
     return to_camera, to_pos @ state.viewmats[tracks.views, :3, :3]
@@ -298,7 +288,7 @@ def _priors(state: _State, problem: _Problem) -> tuple[np.ndarray, np.ndarray]:
     """What is expected of scales and lenses: precisions (C,) and their part of the gradient."""
     optics = problem.optics
     poses = np.zeros((len(optics.focals), _POSE))
-    poses[:, 6] = 1 / _SCALE_SIGMA**2
+    poses[:, 6] = 1 / MATCHING.scale_sigma**2
     doubts = optics.lens_doubts
     lens = np.where(doubts > 0, np.maximum(doubts, 1e-9) ** -2.0, 0.0)
     precisions = np.concatenate((poses.ravel(), lens))
@@ -353,7 +343,7 @@ def _held(state: _State, problem: _Problem, shifts: np.ndarray) -> np.ndarray:
     backs = state.viewmats[tracks.views, 2]
     depths = np.einsum("mj,mj->m", backs[:, :3], state.points[tracks.points]) + backs[:, 3]
     nearer = -np.einsum("mj,mj->m", backs[:, :3], shifts[tracks.points])
-    room = (1 - _NEARER) * np.maximum(depths, 0)
+    room = (1 - BUNDLE.nearer) * np.maximum(depths, 0)
     return np.minimum.reduceat(
         np.where(nearer > room, room / np.maximum(nearer, 1e-12), 1.0), _firsts(tracks)
     )
@@ -361,7 +351,7 @@ def _held(state: _State, problem: _Problem, shifts: np.ndarray) -> np.ndarray:
 
 def _without_outliers(state: _State, problem: _Problem) -> tuple[_State, _Problem]:
     residuals = _residuals(state, problem)
-    tracks, rows, points = problem.tracks.subset((residuals[:, :2] ** 2).sum(1) < _OUTLIER**2)
+    tracks, rows, points = problem.tracks.subset((residuals[:, :2] ** 2).sum(1) < BUNDLE.outlier**2)
     if not len(tracks):
         return state, problem
     return replace(state, points=state.points[points]), _Problem.of(

@@ -8,8 +8,7 @@ import numpy as np
 from jaxtyping import Float
 
 from langflash_core.cameras.matching import mutual
-
-MIN_COSINE = 0.8
+from langflash_core.rig.settings import MATCHING
 
 
 def match_cells(
@@ -26,7 +25,7 @@ def match_cells(
     height, width = right.shape[1:]
     cosines = left.reshape(len(left), -1).T @ right.reshape(len(right), -1)
     rows, best = mutual(cosines)
-    keep = cosines[rows, best] > MIN_COSINE
+    keep = cosines[rows, best] > MATCHING.min_cosine
     rows, best = rows[keep], best[keep]
     own = np.stack((rows % left.shape[2], rows // left.shape[2]), 1) + 0.5
     x, y = best % width, best // width

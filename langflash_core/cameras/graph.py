@@ -12,19 +12,13 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float
 
 from langflash_core.cameras.matching import RelativePose
 from langflash_core.rig.settings import GRAPH, Graph
 
 Pairs = Mapping[tuple[int, int], RelativePose]
 """Relative poses by views i < j."""
-
-NEIGHBOURS = 3
-"""Of each photo, with which its depth is compared."""
-_TURN_SIGMA, _SHIFT_SIGMA, _SCALE_SIGMA = np.radians(0.3), 0.03, 0.1
-"""Errors that matches of a pair share, so that no number of them removes it: radians, scene units per unit
-of depth, log scale."""
 
 
 @dataclass(frozen=True)
@@ -36,47 +30,6 @@ class Placed:
     scales: Float[np.ndarray, " V"]
     missing: tuple[int, ...]
     kept: tuple[tuple[int, int], ...]
-
-
-def chosen_pairs(
-    num_views: int, matches: Mapping[tuple[int, int], Int[np.ndarray, "_ 2"]], settings: Graph = GRAPH
-) -> list[tuple[int, int]]:
-    """The pairs to look at: those of each photo with the most matches, and a tree that connects all."""
-    counts = {edge: len(rows) for edge, rows in matches.items()}
-    best = closest(num_views, counts, settings.sources)
-    chosen = {edge for edge in counts if edge[1] in best[edge[0]] or edge[0] in best[edge[1]]}
-    return sorted(chosen | set(_tree(num_views, counts)))
-
-
-def closest(
-    num_views: int, counts: Mapping[tuple[int, int], int], most: int = NEIGHBOURS
-) -> tuple[tuple[int, ...], ...]:
-    """Of each view so many others that share most with it, the first of equal ones first."""
-    found = []
-    for view in range(num_views):
-        shared = sorted(
-            (-count, sum(edge) - view) for edge, count in counts.items() if view in edge and count
-        )
-        found.append(tuple(other for _, other in shared[:most]))
-    return tuple(found)
-
-
-def unconnected(num_views: int, pairs: Pairs, counts: Mapping[tuple[int, int], int]) -> list[tuple[int, int]]:
-    """Edges without a pose that could connect what `pairs` leave apart: a tree of those that share most."""
-    most = 1 + max(counts.values(), default=0)
-    whole = _tree(num_views, {edge: count + most * (edge in pairs) for edge, count in counts.items()})
-    return [edge for edge in whole if edge not in pairs]
-
-
-def _tree(num_views: int, counts: Mapping[tuple[int, int], int]) -> list[tuple[int, int]]:
-    """Kruskal's maximum spanning tree."""
-    part = list(range(num_views))
-    tree = []
-    for i, j in sorted(counts, key=lambda edge: (-counts[edge], edge)):
-        if part[i] != part[j]:
-            tree.append((i, j))
-            part = [part[i] if own == part[j] else own for own in part]
-    return tree
 
 
 def placed(num_views: int, pairs: Pairs, settings: Graph = GRAPH) -> Placed:
@@ -176,8 +129,8 @@ def gap(
 def _precision(pose: RelativePose) -> np.ndarray:
     """Inverse covariance (7, 7) of an edge: (L^-1 + S)^-1 with L the information of its matches and S what
     they share. In units of S it is L (L + 1)^-1, also where the matches say nothing of a direction."""
-    shift = _SHIFT_SIGMA * (0.1 + np.linalg.norm(pose.translation))
-    sigmas = np.array([_TURN_SIGMA] * 3 + [shift] * 3 + [_SCALE_SIGMA])
+    shift = GRAPH.shift_sigma * (0.1 + np.linalg.norm(pose.translation))
+    sigmas = np.array([np.radians(GRAPH.turn_sigma)] * 3 + [shift] * 3 + [GRAPH.scale_sigma])
     units = np.outer(sigmas, sigmas)
     values, axes = np.linalg.eigh(pose.information * units)
     values = values.clip(0)  # rounding

@@ -6,11 +6,10 @@ import numpy as np
 from jaxtyping import Float
 
 from langflash_core.cameras.dense import match_cells
-from langflash_core.cameras.keypoints import WORKING_SIDE, KeyPoints
+from langflash_core.cameras.keypoints import KeyPoints
 from langflash_core.cameras.matching import Matches
-
-DENSE_SIGMA = 3.0
-"""Pixels at the working size: a third of a cell."""
+from langflash_core.geometry.pinhole import from_pixels, to_pixels
+from langflash_core.rig.settings import MATCHING
 
 
 @dataclass(frozen=True)
@@ -52,10 +51,10 @@ def dense_matches(view_i: PoseInput, view_j: PoseInput) -> Matches:
     """Cells of local features that choose each other."""
     cells_i, cells_j = match_cells(view_i.local, view_j.local)
     x_i, x_j = (
-        (cells * (np.array(view.size) / view.local.shape[:0:-1]) - view.K[:2, 2]) / view.K.diagonal()[:2]
+        from_pixels(cells * (np.array(view.size) / view.local.shape[:0:-1]), view.K)
         for view, cells in ((view_i, cells_i), (view_j, cells_j))
     )
-    return Matches(x_i, x_j, normalised_sigma(view_j, DENSE_SIGMA), np.full((len(x_i), 2), -1))
+    return Matches(x_i, x_j, normalised_sigma(view_j, MATCHING.dense_sigma), np.full((len(x_i), 2), -1))
 
 
 def with_dense(exact: Matches, dense: Matches) -> Matches:
@@ -66,17 +65,16 @@ def with_dense(exact: Matches, dense: Matches) -> Matches:
 
 def normalised_sigma(view: PoseInput, pixels: float) -> float:
     """`pixels` at the working size, as normalised coordinates."""
-    return pixels * max(view.size) / WORKING_SIDE / view.K[0, 0]
+    return pixels * max(view.size) / MATCHING.working_side / view.K[0, 0]
 
 
 def without_camera(pixels: Float[np.ndarray, "n 2"], view: PoseInput) -> Float[np.ndarray, "n 2"]:
-    """Pixels of a picture whose longer side is `WORKING_SIDE` -> normalised coordinates (n, 2)."""
-    own = pixels * (max(view.size) / WORKING_SIDE)
-    return (own - view.K[:2, 2]) / view.K.diagonal()[:2]
+    """Pixels of a picture whose longer side is `MATCHING.working_side` -> normalised coordinates (n, 2)."""
+    return from_pixels(pixels * (max(view.size) / MATCHING.working_side), view.K)
 
 
 def depths_at(view: PoseInput, x: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, " n"]:
     """z (n,) of the monocular map at normalised coordinates (n, 2)."""
-    pixels = x * view.K.diagonal()[:2] + view.K[:2, 2]
-    columns, rows = np.clip(pixels.astype(int), 0, np.array(view.size) - 1).T
+    pixels = np.array(to_pixels(x[:, 0], x[:, 1], 1.0, view.K)).astype(int)
+    columns, rows = np.clip(pixels, 0, np.array(view.size)[:, None] - 1)
     return view.depth[rows, columns].astype(np.float64)

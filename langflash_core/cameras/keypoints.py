@@ -10,22 +10,25 @@ import numpy as np
 from jaxtyping import Float, Int, Shaped, UInt8
 
 from langflash_core.cameras.matching import detect, match_descriptors
-from langflash_core.cameras.retrieval import likely_pairs
+from langflash_core.cameras.retrieval import likeness
+from langflash_core.rig.pairs import likely_pairs
+from langflash_core.rig.settings import MATCHING
 
 Told = Callable[[str, int, int], None]
-
-WORKING_SIDE = 768  # pixels of the longer side at which photos are matched
-_MANY_VIEWS = 4  # beyond this, fewer features keep the pairs affordable
-_FEATURES = {True: 1500, False: 4000}  # of many views, of few
 
 
 @dataclass(frozen=True)
 class KeyPoints:
-    """positions: per view (n, 2), pixels of the photo scaled to `WORKING_SIDE`. pairs: per pair of
+    """positions: per view (n, 2), pixels of the photo scaled to `MATCHING.working_side`. pairs: per pair of
     views i < j that may show the same, rows of both (m, 2) that correspond."""
 
     positions: tuple[Float[np.ndarray, "_ 2"], ...]
     pairs: dict[tuple[int, int], Int[np.ndarray, "_ 2"]]
+
+    @property
+    def counts(self) -> dict[tuple[int, int], int]:
+        """How many matches each pair has."""
+        return {pair: len(rows) for pair, rows in self.pairs.items()}
 
     def arrays(self) -> dict[str, Shaped[np.ndarray, "..."]]:
         """Both, end to end, to be kept."""
@@ -51,9 +54,10 @@ def match_sources(
     sources: tuple[bytes, ...],
     check: Callable[[], None] = lambda: None,
     told: Told = lambda what, done, count: None,
+    pairs: Sequence[tuple[int, int]] | None = None,
 ) -> KeyPoints:
     """`match_photos` of pictures as JPEG bytes."""
-    return match_photos(_Decoded(sources), check, told)
+    return match_photos(_Decoded(sources), check, told, pairs)
 
 
 class _Decoded(Sequence[np.ndarray]):
@@ -77,13 +81,15 @@ def match_photos(
     greys: Sequence[UInt8[np.ndarray, "_ _"]],
     check: Callable[[], None] = lambda: None,
     told: Told = lambda what, done, count: None,
+    pairs: Sequence[tuple[int, int]] | None = None,
 ) -> KeyPoints:
-    """Key points of photos (h, w) uint8 of one shape, and what corresponds; deterministic.
+    """Key points of photos (h, w) uint8 of one shape, and what corresponds; deterministic. pairs: that are
+    compared; None: those that are likely to show the same.
 
     `check` is called before each photo and each pair; what it raises ends the work. So is `told`, with what
     is done, how much of it was, and of how much.
     """
-    limit = _FEATURES[len(greys) > _MANY_VIEWS]
+    limit = MATCHING.features_of_many if len(greys) > MATCHING.many else MATCHING.features
     positions, descriptors = [], []
     for number, grey in enumerate(greys):
         check()
@@ -91,29 +97,14 @@ def match_photos(
         own_positions, own_descriptors = detect(_working_size(grey), limit)
         positions.append(own_positions)
         descriptors.append(own_descriptors)
-    pairs, likely = {}, likely_pairs(descriptors)
-    for number, (i, j) in enumerate(likely):
+    if pairs is None:
+        pairs = likely_pairs(len(descriptors), lambda: likeness(descriptors))
+    matched = {}
+    for number, (i, j) in enumerate(pairs):
         check()
-        told("matching pairs", number, len(likely))
-        pairs[i, j] = match_descriptors(descriptors[i], descriptors[j])
-    return KeyPoints(tuple(positions), pairs)
-
-
-def match_with(
-    known: Sequence[bytes], new: Sequence[bytes], check: Callable[[], None] = lambda: None
-) -> KeyPoints:
-    """Key points of photos as JPEG bytes, those that are known first, and what corresponds between each known
-    one and each new one."""
-    described = []
-    for source in (*known, *new):
-        check()
-        described.append(detect(_working_size(decoded(source)), _FEATURES[True]))
-    pairs = {
-        (i, j): match_descriptors(described[i][1], described[j][1])
-        for j in range(len(known), len(described))
-        for i in range(len(known))
-    }
-    return KeyPoints(tuple(positions for positions, _ in described), pairs)
+        told("matching pairs", number, len(pairs))
+        matched[i, j] = match_descriptors(descriptors[i], descriptors[j])
+    return KeyPoints(tuple(positions), matched)
 
 
 def decoded(source: bytes) -> UInt8[np.ndarray, "h w"]:
@@ -125,7 +116,7 @@ def decoded(source: bytes) -> UInt8[np.ndarray, "h w"]:
 
 def _working_size(grey: np.ndarray) -> np.ndarray:
     """Small pictures are enlarged: SIFT needs pixels to find more than a handful of points."""
-    ratio = WORKING_SIDE / max(grey.shape)
+    ratio = MATCHING.working_side / max(grey.shape)
     if ratio == 1:
         return grey
     method = cv2.INTER_CUBIC if ratio > 1 else cv2.INTER_AREA

@@ -7,14 +7,7 @@ from jaxtyping import Bool, Float
 
 from langflash_core.cameras.matching import Matches, triangulate
 from langflash_core.errors import InputError
-
-_TOLERANCE = 3.0  # standard deviations of a match from its epipolar line
-_LEAST_PARALLAX = 2.0  # standard deviations of a match that its depth must move it by
-_LOOSE = 6.0
-"""Standard deviations within which a pose explains a match: two thirds of a degree of a usual lens."""
-_AGREED = 0.5
-"""Share of the matches which poses explain that are sought: given ones that fit explain as many and more."""
-_FEWEST = 12  # matches that say a map's scale
+from langflash_core.rig.settings import KNOWN_POSES
 
 
 def agreeing(matches: Matches, relative: Float[np.ndarray, "4 4"]) -> Matches:
@@ -32,12 +25,12 @@ def agreeing(matches: Matches, relative: Float[np.ndarray, "4 4"]) -> Matches:
     distances = np.abs((x_j * lines_j).sum(1)) / np.sqrt(np.maximum(slopes, 1e-24))  # Sampson's
     depths = triangulate(matches.x_i, matches.x_j, rotation, shift)
     ahead = (depths > 0) & ((x_i * depths[:, None]) @ rotation[2] + shift[2] > 0)
-    return matches.subset((distances < _TOLERANCE * matches.sigma) & ahead)
+    return matches.subset((distances < KNOWN_POSES.tolerance * matches.sigma) & ahead)
 
 
 def explained(matches: Matches, relative: Float[np.ndarray, "4 4"]) -> int:
-    """How many matches a pose explains, within `_LOOSE` standard deviations: by a point in front of both
-    cameras, or by one that is far away.
+    """How many matches a pose explains, within `KNOWN_POSES.loose` standard deviations: by a point in front
+    of both cameras, or by one that is far away.
 
     Args:
         relative: (4, 4), pos_j = R pos_i + t.
@@ -53,7 +46,7 @@ def _meets(points: Float[np.ndarray, "n 3"], matches: Matches) -> Bool[np.ndarra
     """Whether points in front of camera j are seen where their matches are."""
     ahead = points[:, 2] > 1e-9
     seen = points[:, :2] / np.where(ahead, points[:, 2], 1)[:, None]
-    return ahead & (np.linalg.norm(seen - matches.x_j, axis=1) < _LOOSE * matches.sigma)
+    return ahead & (np.linalg.norm(seen - matches.x_j, axis=1) < KNOWN_POSES.loose * matches.sigma)
 
 
 def doubt(pairs: Sequence[tuple[int, int]]) -> str:
@@ -64,7 +57,7 @@ def doubt(pairs: Sequence[tuple[int, int]]) -> str:
             sought without it.
     """
     given, sought = (sum(counts) for counts in zip(*pairs, strict=True)) if pairs else (0, 0)
-    if given >= _AGREED * sought:
+    if given >= KNOWN_POSES.agreed * sought:
         return ""
     return (
         f"the photos do not look as the poses say: {given} of {sought} matches between them fit; "
@@ -88,7 +81,7 @@ def log_scales(
     points = np.c_[matches.x_i, np.ones(len(true_i))] * true_i[:, None]
     true_j = points @ rotation[2] + shift[2]
     parallax = np.linalg.norm(shift) / np.maximum(np.minimum(true_i, true_j), 1e-12)
-    sure = (true_i > 0) & (true_j > 0) & (parallax > _LEAST_PARALLAX * matches.sigma)
+    sure = (true_i > 0) & (true_j > 0) & (parallax > KNOWN_POSES.least_parallax * matches.sigma)
     return np.log(true_i[sure] / depths_i[sure]), np.log(true_j[sure] / depths_j[sure])
 
 
@@ -99,10 +92,10 @@ def depth_scales(said: list[Float[np.ndarray, " _"]]) -> Float[np.ndarray, " V"]
         InputError: no view has matches enough.
     """
     everything = np.concatenate(said) if said else np.zeros(0)
-    if len(everything) < _FEWEST:
+    if len(everything) < KNOWN_POSES.fewest:
         raise InputError(
             "the photos do not fit the poses: too little of them matches where the poses say it must; "
             "check that poses and photos belong together, or leave --poses out"
         )
     common = np.median(everything)
-    return np.exp([np.median(own) if len(own) >= _FEWEST else common for own in said])
+    return np.exp([np.median(own) if len(own) >= KNOWN_POSES.fewest else common for own in said])

@@ -12,24 +12,7 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, Float, Int, Shaped, UInt8
 
-_MAX_FEATURES = 4000
-_CONTRAST = 0.01  # walls have little: the default of 0.04 finds nothing on them
-_RATIO = 0.8  # Lowe's test
-MIN_INLIERS = 15
-"""Matches that must agree with a pose."""
-_DEPTH_SIGMA = 0.25  # log-depth error expected of a monocular map
-_SCALE_SIGMA = 0.3  # log ratio expected between the scales of two monocular maps
-_INDEPENDENT = 20
-"""Errors of one map go together: at all matches of a pair they count as this many. On 48 validation rooms
-the mean errors were .53 and 2.4 degrees with 50, .48 and 2.1 with 20, .57 and 2.0 with 10; without the
-rounds below .63 and 3.0 with 50. On 32 held-out rooms the medians went from .68 and 2.2 to .31 and 1.7."""
-_ROUNDS = 2  # times that the matches which agree are chosen anew and the pose is refined on them
-_INLIER = 3.0  # sigmas of reprojection
-_CAUCHY = 2.0  # residuals beyond this many sigma lose weight
-_ITERATIONS = 40
-_CONVERGED = 1e-5
-"""Share of the cost below which a step's gain ends the search. Against searching on, the errors of 16
-validation pairs changed by at most .03 (rotation) and .11 degrees (direction); no right pose was lost."""
+from langflash_core.rig.settings import MATCHING
 
 
 @dataclass(frozen=True)
@@ -83,7 +66,7 @@ class RelativePose:
 
 
 def detect(
-    grey: UInt8[np.ndarray, "H W"], num_features: int = _MAX_FEATURES
+    grey: UInt8[np.ndarray, "H W"], num_features: int = MATCHING.features
 ) -> tuple[Float[np.ndarray, "n 2"], Float[np.ndarray, "n 128"]]:
     """RootSIFT: pixel positions (n, 2) with centres at +0.5, and descriptors (n, 128).
 
@@ -92,7 +75,7 @@ def detect(
 
     Source: Lowe 2004; square-root normalisation of Arandjelovic and Zisserman 2012.
     """
-    sift = cv2.SIFT.create(nfeatures=num_features, contrastThreshold=_CONTRAST)
+    sift = cv2.SIFT.create(nfeatures=num_features, contrastThreshold=MATCHING.contrast)
     keypoints, descriptors = sift.detectAndCompute(grey, None)
     if descriptors is None or len(keypoints) < 2:
         return np.zeros((0, 2)), np.zeros((0, 128), np.float32)
@@ -121,7 +104,7 @@ def match_descriptors(
     second = similarity[rows].max(1)
     # Twins in one photo are as near as each other: rounding, 1e-7 of a product, must not choose between them.
     distances = np.sqrt(np.maximum(2 - 2 * np.stack((first, second)), 1e-6))
-    keep = distances[0] < _RATIO * distances[1]
+    keep = distances[0] < MATCHING.ratio * distances[1]
     return np.stack((rows[keep], best[keep]), 1)
 
 
@@ -136,23 +119,23 @@ def relative_pose(
     Args:
         depth_i, depth_j: (n,) z of the monocular maps at the matches, > 0.
     """
-    if len(matches) < MIN_INLIERS:
+    if len(matches) < MATCHING.fewest:
         return None
     candidates = [(np.eye(3), np.zeros(3), np.ones(len(matches), bool))]
     candidates += _five_point(matches, depth_i) + _pnp(matches, depth_i)
     best = None
     for rotation, translation, keep in candidates:
-        if keep.sum() < MIN_INLIERS:
+        if keep.sum() < MATCHING.fewest:
             continue
         pose = refine_pose(matches.subset(keep), depth_i[keep], depth_j[keep], rotation, translation)
         pose = _score(matches, depth_i, depth_j, pose)
         if best is None or pose.cost < best.cost:
             best = pose
-    for _ in range(_ROUNDS):
-        if best is None or best.num_inliers < MIN_INLIERS:
+    for _ in range(MATCHING.rounds):
+        if best is None or best.num_inliers < MATCHING.fewest:
             return None
         best = _score(matches, depth_i, depth_j, _refined(matches, depth_i, depth_j, best))
-    return best if best is not None and best.num_inliers >= MIN_INLIERS else None
+    return best if best is not None and best.num_inliers >= MATCHING.fewest else None
 
 
 def _refined(matches: Matches, depth_i: np.ndarray, depth_j: np.ndarray, pose: RelativePose) -> RelativePose:
@@ -167,14 +150,14 @@ def _five_point(matches: Matches, depth_i: np.ndarray) -> list[tuple[np.ndarray,
     essential, inliers = cv2.findEssentialMat(
         matches.x_i, matches.x_j, np.eye(3), method=cv2.USAC_MAGSAC, prob=0.9999, threshold=threshold
     )
-    if essential is None or essential.shape != (3, 3) or inliers.sum() < MIN_INLIERS:
+    if essential is None or essential.shape != (3, 3) or inliers.sum() < MATCHING.fewest:
         return []
     keep = inliers[:, 0].astype(bool)
     _, rotation, direction, _ = cv2.recoverPose(essential, matches.x_i[keep], matches.x_j[keep], np.eye(3))
     direction = direction[:, 0]
     depths = triangulate(matches.x_i[keep], matches.x_j[keep], rotation, direction)
     usable = np.isfinite(depths) & (depths > 0)
-    if usable.sum() < MIN_INLIERS // 2:
+    if usable.sum() < MATCHING.fewest // 2:
         return [(rotation, np.zeros(3), keep)]
     length = np.median(depth_i[keep][usable] / depths[usable])
     return [(rotation, direction * length, keep), (rotation, np.zeros(3), keep)]
@@ -224,7 +207,7 @@ class DepthPriors:
     @staticmethod
     def of(depth_i: Float[np.ndarray, " n"], depth_j: Float[np.ndarray, " n"]) -> "DepthPriors":
         """From depths (n,) > 0."""
-        return DepthPriors(np.log(depth_i), np.log(depth_j), min(1.0, _INDEPENDENT / len(depth_i)))
+        return DepthPriors(np.log(depth_i), np.log(depth_j), min(1.0, MATCHING.independent / len(depth_i)))
 
     def weigh(self, terms: Float[np.ndarray, "n 4"]) -> Float[np.ndarray, "n 4"]:
         """Terms (n, 4) of the residuals, those of depth times `share`."""
@@ -248,9 +231,9 @@ def refine_pose(
     state = _State(rotation, translation, 0.0, np.log(depth_i))
     priors = DepthPriors.of(depth_i, depth_j)
     damping, cost = 1e-3, np.inf
-    for _ in range(_ITERATIONS):
+    for _ in range(MATCHING.iterations):
         residuals, jac_pose, jac_depth = _linearise(state, matches, priors)
-        weights = priors.weigh(1 / (1 + (residuals / _CAUCHY) ** 2))
+        weights = priors.weigh(1 / (1 + (residuals / MATCHING.cauchy) ** 2))
         cost = _robust_cost(residuals, priors)
         step = _solve(residuals, weights, jac_pose, jac_depth, state.log_scale, damping)
         trial = state.moved(*step)
@@ -259,11 +242,11 @@ def refine_pose(
             state, damping = trial, max(damping / 5, 1e-9)
         else:
             damping *= 8
-        if np.abs(step[0]).max() < 1e-8 or damping > 1e8 or 0 < gain < _CONVERGED * cost:
+        if np.abs(step[0]).max() < 1e-8 or damping > 1e8 or 0 < gain < MATCHING.converged * cost:
             break
     residuals, jac_pose, jac_depth = _linearise(state, matches, priors)
-    agrees = np.linalg.norm(residuals[:, :2], axis=1) < _INLIER
-    weights = priors.weigh(1 / (1 + (residuals / _CAUCHY) ** 2))
+    agrees = np.linalg.norm(residuals[:, :2], axis=1) < MATCHING.inlier
+    weights = priors.weigh(1 / (1 + (residuals / MATCHING.cauchy) ** 2))
     information, _, _ = _reduced(weights, jac_pose, jac_depth, 0.0)
     return RelativePose(state.rotation, state.translation, state.log_scale, agrees, cost, information)
 
@@ -279,8 +262,9 @@ def _score(matches: Matches, depth_i: np.ndarray, depth_j: np.ndarray, pose: Rel
         pose.rotation, pose.translation, pose.log_scale, np.clip(np.log(depths), log_prior - 1, log_prior + 1)
     )
     residuals = _residuals(state, matches, priors)
-    agrees = (np.linalg.norm(residuals[:, :2], axis=1) < _INLIER) & (np.abs(residuals[:, 2:]) < 4).all(1)
-    costs = np.minimum(np.log1p((residuals / _CAUCHY) ** 2).sum(1), 6.0)
+    agrees = np.linalg.norm(residuals[:, :2], axis=1) < MATCHING.inlier
+    agrees &= (np.abs(residuals[:, 2:]) < 4).all(1)
+    costs = np.minimum(np.log1p((residuals / MATCHING.cauchy) ** 2).sum(1), 6.0)
     return replace(pose, inliers=agrees, cost=float(costs.mean()))
 
 
@@ -306,8 +290,8 @@ def _residuals(state: _State, matches: Matches, priors: DepthPriors) -> np.ndarr
     )
     z = np.maximum(pos_j[:, 2], 1e-6)
     reprojection = (pos_j[:, :2] / z[:, None] - matches.x_j) / matches.sigma
-    from_i = (state.log_depths - priors.log_i) / _DEPTH_SIGMA
-    from_j = (np.log(z) - priors.log_j - state.log_scale) / _DEPTH_SIGMA
+    from_i = (state.log_depths - priors.log_i) / MATCHING.depth_sigma
+    from_j = (np.log(z) - priors.log_j - state.log_scale) / MATCHING.depth_sigma
     return np.column_stack((reprojection, from_i, from_j))
 
 
@@ -322,13 +306,13 @@ def _linearise(
     to_point = np.zeros((n, 4, 3))
     to_point[:, 0, 0] = to_point[:, 1, 1] = 1 / (z * matches.sigma)
     to_point[:, :2, 2] = -pos_j[:, :2] / (z * z * matches.sigma)[:, None]
-    to_point[:, 3, 2] = 1 / (z * _DEPTH_SIGMA)
+    to_point[:, 3, 2] = 1 / (z * MATCHING.depth_sigma)
     jac_pose = np.zeros((n, 4, 7))
     jac_pose[:, :, :3] = np.cross(turned[:, None], to_point)
     jac_pose[:, :, 3:6] = to_point
-    jac_pose[:, 3, 6] = -1 / _DEPTH_SIGMA
+    jac_pose[:, 3, 6] = -1 / MATCHING.depth_sigma
     jac_depth = (to_point * turned[:, None]).sum(2)
-    jac_depth[:, 2] += 1 / _DEPTH_SIGMA
+    jac_depth[:, 2] += 1 / MATCHING.depth_sigma
     return _residuals(state, matches, priors), jac_pose, jac_depth
 
 
@@ -337,7 +321,7 @@ def _solve(residuals, weights, jac_pose, jac_depth, log_scale, damping) -> tuple
     reduced, cross, own = _reduced(weights, jac_pose, jac_depth, damping)
     gradient = residuals.ravel() @ (jac_pose * weights[..., None]).reshape(-1, 7)
     own_gradient = (weights * jac_depth * residuals).sum(1)
-    gradient[6] += log_scale / _SCALE_SIGMA**2
+    gradient[6] += log_scale / MATCHING.scale_sigma**2
     pose_step = -np.linalg.solve(reduced, gradient - cross.T @ (own_gradient / own))
     return pose_step, -(own_gradient + cross @ pose_step) / own
 
@@ -348,13 +332,13 @@ def _reduced(weights, jac_pose, jac_depth, damping: float) -> tuple[np.ndarray, 
     hessian = weighted.reshape(-1, 7).T @ jac_pose.reshape(-1, 7)
     cross = (weighted * jac_depth[..., None]).sum(1)
     own = (weights * jac_depth**2).sum(1) * (1 + damping)
-    hessian[6, 6] += 1 / _SCALE_SIGMA**2
+    hessian[6, 6] += 1 / MATCHING.scale_sigma**2
     hessian[np.diag_indices(7)] += damping * np.diag(hessian) + 1e-9
     return hessian - (cross / own[:, None]).T @ cross, cross, own
 
 
 def _robust_cost(residuals: np.ndarray, priors: DepthPriors) -> float:
-    return float(priors.weigh(np.log1p((residuals / _CAUCHY) ** 2)).sum(1).mean())
+    return float(priors.weigh(np.log1p((residuals / MATCHING.cauchy) ** 2)).sum(1).mean())
 
 
 def _homogeneous(x: np.ndarray) -> np.ndarray:

@@ -12,13 +12,7 @@ import numpy as np
 from jaxtyping import UInt8
 
 from langflash_core.cameras.matching import detect, match_descriptors
-
-_SIDE = 640  # pixels of the longer side at which photos are compared
-_FEATURES = 1500
-_FEWEST = 20  # agreeing matches below which two photos share nothing
-_TOLERANCE = 1.5  # pixels at that side
-_ENOUGH = 0.01  # parallax, in sides, from which more makes a pair no better
-_LEAST = 0.05  # what a pair without parallax is worth
+from langflash_core.rig.settings import FILM_PAIR
 
 
 def choose_pair(
@@ -31,7 +25,7 @@ def choose_pair(
     features = []
     for grey in greys:
         check()
-        features.append(detect(_scaled(grey), _FEATURES))
+        features.append(detect(_scaled(grey), FILM_PAIR.features))
     best, chosen = 0.0, None
     for i, j in combinations(range(len(greys)), 2):
         check()
@@ -42,7 +36,7 @@ def choose_pair(
 
 
 def _scaled(grey: np.ndarray) -> np.ndarray:
-    ratio = _SIDE / max(grey.shape)
+    ratio = FILM_PAIR.side / max(grey.shape)
     method = cv2.INTER_AREA if ratio < 1 else cv2.INTER_CUBIC
     return cv2.resize(grey, None, fx=ratio, fy=ratio, interpolation=method)
 
@@ -52,17 +46,17 @@ def _worth(
 ) -> float:
     """Agreeing matches, fewer where they show no parallax. pos: (n, 2) pixels."""
     pairs = match_descriptors(descriptors_i, descriptors_j)
-    if len(pairs) < _FEWEST:
+    if len(pairs) < FILM_PAIR.fewest:
         return 0.0
     x_i, x_j = pos_i[pairs[:, 0]], pos_j[pairs[:, 1]]
-    _, agree = cv2.findFundamentalMat(x_i, x_j, cv2.USAC_MAGSAC, _TOLERANCE, 0.999)
-    if agree is None or int(agree.sum()) < _FEWEST:
+    _, agree = cv2.findFundamentalMat(x_i, x_j, cv2.USAC_MAGSAC, FILM_PAIR.tolerance, 0.999)
+    if agree is None or int(agree.sum()) < FILM_PAIR.fewest:
         return 0.0
     keep = agree.ravel().astype(bool)
     x_i, x_j = x_i[keep], x_j[keep]
-    plane, _ = cv2.findHomography(x_i, x_j, cv2.USAC_MAGSAC, _TOLERANCE)
+    plane, _ = cv2.findHomography(x_i, x_j, cv2.USAC_MAGSAC, FILM_PAIR.tolerance)
     if plane is None:
         return float(keep.sum())
     moved = cv2.perspectiveTransform(x_i[:, None], plane)[:, 0]
-    parallax = float(np.percentile(np.linalg.norm(moved - x_j, axis=1), 75)) / _SIDE
-    return float(keep.sum()) * max(min(parallax / _ENOUGH, 1.0), _LEAST)
+    parallax = float(np.percentile(np.linalg.norm(moved - x_j, axis=1), 75)) / FILM_PAIR.side
+    return float(keep.sum()) * max(min(parallax / FILM_PAIR.enough, 1.0), FILM_PAIR.least)

@@ -10,8 +10,7 @@ import cv2
 import numpy as np
 from jaxtyping import Bool, Float
 
-_LEAST = 6
-"""Points that must agree: fewer determine no pose beyond their own noise."""
+from langflash_core.rig.settings import ADDING
 
 
 @dataclass(frozen=True)
@@ -34,7 +33,7 @@ def place_camera(
     Args:
         tolerance: pixels by which one that agrees may miss.
     """
-    if len(points) < _LEAST:
+    if len(points) < ADDING.least:
         return None
     middle = np.median(points, 0)
     spread = float(np.median(np.linalg.norm(points - middle, axis=1)))
@@ -44,7 +43,7 @@ def place_camera(
         points / unit, pixels, K, None,
         iterationsCount=200, reprojectionError=tolerance, confidence=0.9999, flags=cv2.SOLVEPNP_SQPNP,
     )  # fmt: skip
-    if not found or inliers is None or len(inliers) < _LEAST:
+    if not found or inliers is None or len(inliers) < ADDING.least:
         return None
     agree = np.zeros(len(points), dtype=bool)
     agree[inliers[:, 0].astype(np.int64)] = True

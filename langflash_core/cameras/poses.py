@@ -8,7 +8,6 @@ from jaxtyping import Float
 
 from langflash_core.base.records import FoundFocal
 from langflash_core.cameras.adjustment import (
-    FEWEST,
     Adjusted,
     Agreed,
     Sought,
@@ -17,7 +16,7 @@ from langflash_core.cameras.adjustment import (
     log_depths,
 )
 from langflash_core.cameras.alignment import NO_CORRECTION, Correction, fit_correction
-from langflash_core.cameras.graph import Placed, chosen_pairs, placed, unconnected
+from langflash_core.cameras.graph import Placed, placed
 from langflash_core.cameras.inputs import (
     PoseInput,
     dense_matches,
@@ -28,13 +27,13 @@ from langflash_core.cameras.inputs import (
 from langflash_core.cameras.keypoints import KeyPoints
 from langflash_core.cameras.known import agreeing, depth_scales, doubt, explained, log_scales
 from langflash_core.cameras.matching import (
-    MIN_INLIERS,
     Matches,
     RelativePose,
     relative_pose,
     triangulate,
 )
-from langflash_core.rig.settings import PAIRING, Pairing
+from langflash_core.rig.pairs import bridges, scores_of, strongest
+from langflash_core.rig.settings import ADJUSTMENT, MATCHING, PAIRING, Pairing
 
 
 @dataclass(frozen=True)
@@ -94,14 +93,10 @@ def estimate_poses(
     """
     num_views = len(views)
     told = {edge: rows for edge, rows in points.pairs.items() if not _blank(points, edge)}
-    if known is None and num_views >= FEWEST:
-        return _together(
-            views, replace(points, pairs=told), sought or given_lenses(num_views), check, settings=settings
-        )
-    edges = {
-        edge: key_point_matches(views, points, *edge)
-        for edge in chosen_pairs(num_views, told, settings.graph)
-    }
+    points = replace(points, pairs=told)
+    if known is None and num_views >= ADJUSTMENT.fewest:
+        return _together(views, points, sought or given_lenses(num_views), check, settings=settings)
+    edges = _edges(views, points, settings=settings)
     if known is None:
         pairs, agreed = _pair_poses(views, edges, check, settings=settings)
         found = placed(num_views, pairs, settings.graph)
@@ -155,7 +150,7 @@ def _together(
     """
     growths, solved = np.ones(len(views)), None
     if max(sought.doubts) > 0:
-        few = _few(len(views), {edge: len(rows) for edge, rows in points.pairs.items()}, settings=settings)
+        few = _few(len(views), points.counts, settings=settings)
         first = _solved(*_part(views, points, sought, few), check, settings=settings)
         bent = _bent(first[2])
         if bent:
@@ -190,12 +185,19 @@ def _solved(
     settings: Pairing = PAIRING,
 ) -> tuple[Placed, Agreed, Adjusted | None]:
     """Poses by pairs, the matches that agree with them, and what all say together."""
-    chosen = chosen_pairs(len(views), points.pairs, settings.graph)
-    edges = {edge: key_point_matches(views, points, *edge) for edge in chosen}
+    edges = _edges(views, points, settings=settings)
     pairs, agreed = _pair_poses(views, edges, check, settings=settings)
     found = placed(len(views), pairs, settings.graph)
     agreed = {edge: agreed[edge] for edge in found.kept}
     return found, agreed, adjusted_photos(views, points, found, agreed, sought, check, settings.adjustment)
+
+
+def _edges(
+    views: list[PoseInput], points: KeyPoints, settings: Pairing = PAIRING
+) -> dict[tuple[int, int], Matches]:
+    """Matches of the pairs to look at: those of each photo with the most, and a tree that connects all."""
+    chosen = sorted(strongest(scores_of(len(views), points.counts), settings.graph.sources))
+    return {edge: key_point_matches(views, points, *edge) for edge in chosen}
 
 
 def _few(num_views: int, counts: Mapping[tuple[int, int], int], settings: Pairing = PAIRING) -> list[int]:
@@ -278,7 +280,7 @@ def _of_adjusted(
 def _blank(points: KeyPoints, edge: tuple[int, int]) -> bool:
     """Whether one of two photos shows nothing to tell places by: dense matches are its borders then, which
     agree with those of any photo."""
-    return min(len(points.positions[view]) for view in edge) < MIN_INLIERS
+    return min(len(points.positions[view]) for view in edge) < MATCHING.fewest
 
 
 def _pair_poses(
@@ -303,7 +305,7 @@ def _pair_poses(
             agreed[i, j] = matches.subset(pose.inliers)
     counts = {edge: len(matches) for edge, matches in edges.items()}
     for _ in range(settings.bridges):
-        for i, j in unconnected(len(views), pairs, counts):
+        for i, j in bridges(scores_of(len(views), counts), pairs):
             check()
             more = with_dense(edges[i, j], dense_matches(views[i], views[j]))
             better = _pair_pose(views[i], views[j], more, settings=settings)

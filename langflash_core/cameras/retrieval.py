@@ -1,4 +1,4 @@
-"""Which of many photos may show the same, without matching all with all. Imports no torch.
+"""How alike photos look, without matching all with all. Imports no torch.
 
 A photo is one vector: to each of some words, kinds of descriptors that were learned from the photos
 themselves, the sum of what its descriptors differ from it by. Sizes: V photos, n descriptors of C numbers,
@@ -6,47 +6,24 @@ W words.
 """
 
 from collections.abc import Sequence
-from itertools import combinations
 
 import numpy as np
 from jaxtyping import Float
 
-ALL = 12
-"""Photos up to which every pair is matched."""
-_SIMILAR, _NEAR = 8, 3  # of each photo: the most similar others, the next in the order they were given
-_WORDS, _SAMPLES, _ROUNDS = 64, 8000, 8
+from langflash_core.rig.pairs import Scores
+from langflash_core.rig.settings import RETRIEVAL
 
 
-def likely_pairs(descriptors: Sequence[Float[np.ndarray, "_ C"]]) -> list[tuple[int, int]]:
-    """Pairs i < j of photos, in order: all of a few; of many as many for each, those most alike and those
-    that were given one after another.
+def likeness(descriptors: Sequence[Float[np.ndarray, "_ C"]]) -> Scores:
+    """How alike photos look, cosines (V, V); -inf of a photo with itself.
 
     Args:
         descriptors: per photo (n, C), unit rows; n may be 0.
     """
-    count = len(descriptors)
-    if count <= ALL:
-        return list(combinations(range(count), 2))
-    vectors = _vectors(descriptors)
-    alike = vectors @ vectors.T  # (V, V)
-    np.fill_diagonal(alike, -np.inf)
-    nearest = np.argsort(-alike, axis=1, kind="stable")[:, :_SIMILAR]
-    pairs = {(min(i, j), max(i, j)) for i, row in enumerate(nearest.tolist()) for j in row}
-    pairs |= {(i, j) for i in range(count) for j in range(i + 1, min(i + 1 + _NEAR, count))}
-    return sorted(pairs)
-
-
-def most_alike(descriptors: Sequence[Float[np.ndarray, "_ C"]], count: int) -> list[list[int]]:
-    """Of each photo the `count` others most like it, in order; all where there are not so many.
-
-    Args:
-        descriptors: per photo (n, C), unit rows.
-    """
     vectors = _vectors(descriptors)
     alike = vectors @ vectors.T
     np.fill_diagonal(alike, -np.inf)
-    nearest = np.argsort(-alike, axis=1, kind="stable")[:, : min(count, len(vectors) - 1)]
-    return [sorted(row) for row in nearest.tolist()]
+    return alike
 
 
 def _vectors(descriptors: Sequence[np.ndarray]) -> np.ndarray:
@@ -67,11 +44,11 @@ def _vectors(descriptors: Sequence[np.ndarray]) -> np.ndarray:
 def _words(descriptors: Sequence[np.ndarray]) -> np.ndarray:
     """Means (W, C) of clusters, by Lloyd's rounds over evenly chosen descriptors; the same every time."""
     every = np.concatenate(descriptors)
-    chosen = every[np.linspace(0, len(every) - 1, min(_SAMPLES, len(every))).astype(int)]
+    chosen = every[np.linspace(0, len(every) - 1, min(RETRIEVAL.samples, len(every))).astype(int)]
     if len(chosen) == 0:
         return np.zeros((1, every.shape[1]), np.float32)
-    words = chosen[np.linspace(0, len(chosen) - 1, min(_WORDS, len(chosen))).astype(int)].copy()
-    for _ in range(_ROUNDS):
+    words = chosen[np.linspace(0, len(chosen) - 1, min(RETRIEVAL.words, len(chosen))).astype(int)].copy()
+    for _ in range(RETRIEVAL.rounds):
         nearest = _nearest(chosen, words)
         for word in range(len(words)):
             own = chosen[nearest == word]

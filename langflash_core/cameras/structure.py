@@ -20,10 +20,8 @@ from langflash_core.cameras.keypoints import KeyPoints, decoded, match_photos, m
 from langflash_core.cameras.poses import Poses, estimate_poses, on_other_maps
 from langflash_core.geometry.cameras import rays
 from langflash_core.rig.rig import DepthMaps, Rig
+from langflash_core.rig.settings import PAIRING
 from langflash_core.types import Views
-
-_OTHER_LENS = 0.01
-"""Change of the focal length, as a logarithm, from which depth is predicted anew: it is known no better."""
 
 
 def find_poses(
@@ -44,7 +42,7 @@ def find_poses(
 
 def is_other_lens(poses: Poses) -> bool:
     """Whether a lens was found to be another than depth was predicted for."""
-    return bool(np.abs(np.log(poses.growths)).max() > _OTHER_LENS)
+    return bool(np.abs(np.log(poses.growths)).max() > PAIRING.other_depth)
 
 
 def rescale_poses(

@@ -11,7 +11,7 @@ import scipy.sparse
 from jaxtyping import Bool, Float, Int
 from scipy.sparse.csgraph import connected_components
 
-_LONGEST = 32  # observations of a point that are adjusted
+from langflash_core.rig.settings import BUNDLE
 
 
 @dataclass(frozen=True)
@@ -63,14 +63,14 @@ def thinned(tracks: Tracks, most: int) -> Tracks:
 
 
 def _spread(tracks: Tracks) -> np.ndarray:
-    """Of each point the observations (M,) bool that stay: all of `_LONGEST` and fewer; of more so many,
+    """Of each point the observations (M,) bool that stay: all of `BUNDLE.longest` and fewer; of more so many,
     evenly, the first and the last of them too. A point that a hundred photos saw is known from a part of
     them."""
     lengths = np.bincount(tracks.points)
     ranks = np.arange(len(tracks)) - (np.cumsum(lengths) - lengths)[tracks.points]
     steps = np.maximum(lengths[tracks.points] - 1, 1)
-    place, before = (number * (_LONGEST - 1) // steps for number in (ranks, ranks - 1))
-    return (steps < _LONGEST) | (ranks == 0) | (place != before)
+    place, before = (number * (BUNDLE.longest - 1) // steps for number in (ranks, ranks - 1))
+    return (steps < BUNDLE.longest) | (ranks == 0) | (place != before)
 
 
 def no_tracks() -> Tracks:

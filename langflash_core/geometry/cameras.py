@@ -1,4 +1,4 @@
-"""Pinhole cameras, OpenCV axes: projection, rays, fields of view. Pixel centres at +0.5."""
+"""Pinhole cameras, OpenCV axes: rays, rigid transforms, fields of view. Pixel centres at +0.5."""
 
 import math
 
@@ -53,15 +53,6 @@ def unproject(
     if orthographic:
         return torch.cat((ahead[..., :2].expand(*depths.shape, 2), depths[..., None]), -1)
     return ahead * depths[..., None]
-
-
-def project(
-    pos_c: Float[Tensor, "*n 3"], K: Float[Tensor, "... 3 3"], eps: float = 1e-8
-) -> Float[Tensor, "... 2"]:
-    """Pixels (..., 2) of camera-frame points (..., 3); K (3, 3) or broadcastable to (..., 3, 3)."""
-    xy = pos_c[..., :2] / pos_c[..., 2:].clamp_min(eps)
-    focal = torch.stack((K[..., 0, 0], K[..., 1, 1]), -1)
-    return xy * focal + K[..., :2, 2]
 
 
 def transform(

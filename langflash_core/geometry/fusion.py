@@ -16,12 +16,8 @@ import numpy as np
 from jaxtyping import Bool, Float, Integer, UInt8
 
 from langflash_core.base.optional import optional_packages
-
-BAND = (
-    4.0  # voxels on either side of a surface that count: below 3 noise tears holes, above it thickens edges
-)
-_MOST_VOXELS = 3_000_000  # 140 a side: 24 MB for the field and its counts
-_SLAB = 1 << 18  # voxels projected at once
+from langflash_core.geometry.pinhole import see
+from langflash_core.geometry.settings import FUSION
 
 
 @dataclass(frozen=True)
@@ -36,13 +32,9 @@ class DepthView:
         self, points: Float[np.ndarray, "n 3"]
     ) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, " n"], Integer[np.ndarray, " n"]]:
         """Depth z of points, the map's depth there (0 for nothing, or beside it), and the pixel, flat."""
-        x, y, z = (points @ self.viewmat[:3, :3].T + self.viewmat[:3, 3]).T
-        ahead = np.where(z > 0, z, np.inf)
-        columns = np.floor(x / ahead * self.K[0, 0] + self.K[0, 2])
-        rows = np.floor(y / ahead * self.K[1, 1] + self.K[1, 2])
         height, width = self.depths.shape
-        inside = (columns >= 0) & (columns < width) & (rows >= 0) & (rows < height) & (z > 0)
-        pixels = np.where(inside, rows * width + columns, 0).astype(np.int64)
+        x, y, z, inside = see(points, self.viewmat, self.K, (width, height))
+        pixels = np.where(inside, np.floor(y) * width + np.floor(x), 0).astype(np.int64)
         return z, np.where(inside, self.depths.reshape(-1)[pixels], 0.0), pixels
 
 
@@ -79,9 +71,9 @@ def fuse(
     """
     with optional_packages():
         from skimage.measure import marching_cubes  # pyright: ignore[reportMissingImports]
-    voxel = max(voxel, float((np.prod(high - low + 2 * BAND * voxel) / _MOST_VOXELS) ** (1 / 3)))
-    low = low - BAND * voxel
-    shape = np.maximum(np.ceil((high - low) / voxel + BAND).astype(int) + 1, 2)
+    voxel = max(voxel, float((np.prod(high - low + 2 * FUSION.band * voxel) / FUSION.most_voxels) ** (1 / 3)))
+    low = low - FUSION.band * voxel
+    shape = np.maximum(np.ceil((high - low) / voxel + FUSION.band).astype(int) + 1, 2)
     field, seen = _field(views, low, voxel, shape)
     if not (field[seen] > 0).any() or not (field[seen] < 0).any():
         return None
@@ -95,7 +87,7 @@ def fuse(
         return None
     used, faces = np.unique(faces, return_inverse=True)
     vertices = low + voxel * places[used].astype(np.float64)
-    return Surface(vertices, faces.reshape(-1, 3), _coloured(views, vertices, BAND * voxel))
+    return Surface(vertices, faces.reshape(-1, 3), _coloured(views, vertices, FUSION.band * voxel))
 
 
 def _known(seen: Bool[np.ndarray, "X Y Z"]) -> Bool[np.ndarray, "x y z"]:
@@ -113,12 +105,12 @@ def _field(
 ) -> tuple[Float[np.ndarray, "X Y Z"], Bool[np.ndarray, "X Y Z"]]:
     """Mean distance over the band, 1 where unseen, and which voxels were seen."""
     total, count = np.zeros(int(shape.prod()), np.float32), np.zeros(int(shape.prod()), np.int32)
-    for first in range(0, len(total), _SLAB):
-        some = slice(first, min(first + _SLAB, len(total)))
+    for first in range(0, len(total), FUSION.slab):
+        some = slice(first, min(first + FUSION.slab, len(total)))
         centres = low + voxel * np.stack(np.unravel_index(np.arange(some.start, some.stop), shape), -1)
         for view in views:
             depths, there, _ = view.look(centres)
-            distances = (there - depths) / (BAND * voxel)
+            distances = (there - depths) / (FUSION.band * voxel)
             known = (there > 0) & (distances >= -1)
             total[some] += np.where(known, np.minimum(distances, 1), 0)
             count[some] += known

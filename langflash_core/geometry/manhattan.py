@@ -5,10 +5,10 @@ plane that holds `up`. So with m the unit normal of that plane, in the world, m 
 edges along another direction r of the room. Surfaces tell the same, less exactly: their normals n are along
 one of the directions. Edges do not know depth, so their directions are as exact as the photo is sharp.
 
-Two steps. *Search*: of directions up to `MOST_PITCH` from the camera's own up, each with the walls that fit
-it best, those under which all edges are likeliest. *Fit*: from each of the best, Gauss-Newton on a rotation R
-whose columns are the directions, every edge weighted by how well it fits the nearest one, narrower from round
-to round; the likeliest of what comes out is the answer.
+Two steps. *Search*: of directions up to `MANHATTAN.most_pitch` from the camera's own up, each with the walls
+that fit it best, those under which all edges are likeliest. *Fit*: from each of the best, Gauss-Newton on a
+rotation R whose columns are the directions, every edge weighted by how well it fits the nearest one, narrower
+from round to round; the likeliest of what comes out is the answer.
 
 An edge is along one of the directions or along none. Logarithms of chances add up, so that many edges outvote
 what is believed before: that people hold cameras level, and that what answers "floor" is level.
@@ -25,21 +25,10 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-MOST_PITCH = 60.0  # degrees by which the first camera may look up or down
-_PITCHES, _ROLLS = np.arange(-MOST_PITCH, MOST_PITCH + 1, 3.0), np.arange(-12.0, 13.0, 3.0)
-_ROLL, _PITCH = 5.0, 25.0  # degrees, how far people hold cameras from level
-_FLOOR = 12.0  # degrees by which depth lets a floor lean
-_APART = 6.0  # degrees between two directions that are both tried
-_TRIED = 5
-_EDGE, _SURFACE = 2.0, 15.0  # degrees within which an edge, or a surface, agrees with a direction
-_ROUNDS = (6.0, 4.0, 3.0, 2.0, 1.5, 1.0, 1.0, 0.7, 0.7)  # degrees, of the fit
-_ALONG = 0.2  # of edges, along each direction; the others are along none
-_WITNESS = 0.4  # longer sides of a photo: so much edge is one witness; edges come in pieces and in pairs
-_SEARCHED = 500  # edges, the longest; the fit and the choice see all
-_SURFACES_SAY = 10.0  # in logarithms of chances, where all of them are level or upright; edges say more
-_SURFACE_WEIGHT = 0.02  # of all surfaces beside all edges, in the fit: their depth leans
-_FEW = 10.0  # longer sides of photos: as if there were so many edges, where there are fewer
-_LEAST = 0.25  # degrees: no answer is more certain than lenses and photos are
+from langflash_core.geometry.settings import MANHATTAN
+
+_PITCHES = np.arange(-MANHATTAN.most_pitch, MANHATTAN.most_pitch + 1, 3.0)
+_ROLLS = np.arange(-MANHATTAN.most_roll, MANHATTAN.most_roll + 1, 3.0)
 
 
 @dataclass(frozen=True)
@@ -90,7 +79,7 @@ def found_directions(sights: Sights, up: Float[np.ndarray, " 3"] | None = None) 
 
 
 def _starts(sights: Sights) -> list[np.ndarray]:
-    """The directions up that most speaks for, `_APART` from each other."""
+    """The directions up that most speaks for, `MANHATTAN.apart` from each other."""
     from scipy.spatial.transform import Rotation  # .08 s, which reading a scene has not to wait for
 
     home = sights.cameras[0].T
@@ -99,22 +88,22 @@ def _starts(sights: Sights) -> list[np.ndarray]:
     scores = _edges_say(sights, ups) + _surfaces_say(sights, ups) + np.log(_held(sights, ups))
     chosen: list[np.ndarray] = []
     for row in np.argsort(-scores, kind="stable"):
-        if all(ups[row] @ other < math.cos(math.radians(_APART)) for other in chosen):
+        if all(ups[row] @ other < math.cos(math.radians(MANHATTAN.apart)) for other in chosen):
             chosen.append(ups[row])
-        if len(chosen) == _TRIED:
+        if len(chosen) == MANHATTAN.tried:
             break
     return chosen
 
 
 def _edges_say(sights: Sights, ups: np.ndarray) -> np.ndarray:
     """(U,) how likely the longest edges are, for directions (U, 3), each with the walls that fit it best."""
-    longest = np.argsort(-sights.lengths, kind="stable")[:_SEARCHED]
+    longest = np.argsort(-sights.lengths, kind="stable")[: MANHATTAN.searched]
     edges, lengths = sights.edges[longest], sights.lengths[longest]
     scores = np.zeros(len(ups))
     for row, up in enumerate(ups):
-        upright = _near(np.abs(edges @ up), _EDGE)[:, None]
-        along, across = (_near(np.abs(edges @ sides.T), _EDGE) for sides in _sides(up))  # (L, A)
-        scores[row] = _likely(lengths, upright + along + across, _EDGE).max()
+        upright = _near(np.abs(edges @ up), MANHATTAN.edge)[:, None]
+        along, across = (_near(np.abs(edges @ sides.T), MANHATTAN.edge) for sides in _sides(up))  # (L, A)
+        scores[row] = _likely(lengths, upright + along + across, MANHATTAN.edge).max()
     return scores
 
 
@@ -122,7 +111,7 @@ def _likely(lengths: np.ndarray, near: np.ndarray, width: float) -> np.ndarray:
     """(A,) logarithms of the chance of edges of which `near` (L, A) is how near they are to three directions,
     over that of edges along none, whose planes may lie in any way: their sines fill [0, 1] evenly."""
     peak = 2 / (math.sqrt(2 * math.pi) * math.radians(width))  # of a half Gaussian
-    return lengths @ np.log(1 - 3 * _ALONG + _ALONG * peak * near) / _WITNESS
+    return lengths @ np.log(1 - 3 * MANHATTAN.along + MANHATTAN.along * peak * near) / MANHATTAN.witness
 
 
 def _surfaces_say(sights: Sights, ups: np.ndarray) -> np.ndarray:
@@ -130,8 +119,8 @@ def _surfaces_say(sights: Sights, ups: np.ndarray) -> np.ndarray:
     if not len(sights.normals):
         return np.zeros(len(ups))
     lean = np.abs(sights.normals @ ups.T).clip(max=1.0)
-    flat = _near(np.sqrt(1 - lean**2), _SURFACE) + _near(lean, _SURFACE)
-    return _SURFACES_SAY * flat.mean(0)
+    flat = _near(np.sqrt(1 - lean**2), MANHATTAN.surface) + _near(lean, MANHATTAN.surface)
+    return MANHATTAN.surfaces_say * flat.mean(0)
 
 
 def _held(sights: Sights, ups: np.ndarray) -> np.ndarray:
@@ -140,10 +129,11 @@ def _held(sights: Sights, ups: np.ndarray) -> np.ndarray:
     belief = np.ones(len(ups))
     if sights.held:
         sideways, ahead = sights.cameras[:, 0] @ ups.T, sights.cameras[:, 2] @ ups.T  # (V, U)
-        belief = _maybe(_near(np.abs(sideways), _ROLL)).mean(0) * _maybe(_near(np.abs(ahead), _PITCH)).mean(0)
+        belief = _maybe(_near(np.abs(sideways), MANHATTAN.roll)).mean(0)
+        belief = belief * _maybe(_near(np.abs(ahead), MANHATTAN.pitch)).mean(0)
     if sights.floor is not None:
         lean = np.sqrt((1 - (ups @ sights.floor) ** 2).clip(0))
-        belief = belief * _maybe(_near(lean, _FLOOR))
+        belief = belief * _maybe(_near(lean, MANHATTAN.floor))
     return belief
 
 
@@ -157,11 +147,12 @@ def _walls_of(sights: Sights, up: np.ndarray) -> np.ndarray:
     along, across = _sides(up)
     scores = np.zeros(len(along))
     if len(sights.lengths):
-        near = np.maximum(*(_near(np.abs(sights.edges @ side.T), 1.5 * _EDGE) for side in (along, across)))
+        fits = (np.abs(sights.edges @ side.T) for side in (along, across))
+        near = np.maximum(*(_near(fit, 1.5 * MANHATTAN.edge) for fit in fits))
         scores += sights.lengths @ near / max(float(sights.lengths.sum()), 1e-9)
     if len(sights.normals):
         leans = ((sights.normals @ side.T) ** 2 for side in (along, across))
-        near = np.maximum(*(_near(np.sqrt((1 - lean).clip(0)), _SURFACE) for lean in leans))
+        near = np.maximum(*(_near(np.sqrt((1 - lean).clip(0)), MANHATTAN.surface) for lean in leans))
         scores += 0.5 * near.mean(0)
     best = int(scores.argmax())
     return np.stack((along[best], across[best], up), 1)
@@ -181,7 +172,7 @@ def _fitted(sights: Sights, axes: np.ndarray, fixed: bool) -> Directions:
     from scipy.spatial.transform import Rotation
 
     information = np.zeros((3, 3))
-    for width in _ROUNDS:
+    for width in MANHATTAN.rounds:
         information, pull = _normal_equations(sights, axes, width)
         free = axes[:, 2:] if fixed else np.eye(3)
         step = free @ np.linalg.solve(
@@ -214,7 +205,7 @@ def _normal_equations(sights: Sights, axes: np.ndarray, width: float) -> tuple[n
         towards, own = axes.T[best], sights.normals * signs
         turns = np.cross(towards, own)  # the turn that brings r to n
         weights = _near(np.linalg.norm(turns, axis=1), max(2 * width, 6.0))
-        weights *= _SURFACE_WEIGHT * max(float(sights.lengths.sum()), _FEW) / len(weights)
+        weights *= MANHATTAN.surface_weight * max(float(sights.lengths.sum()), MANHATTAN.few) / len(weights)
         across = np.eye(3) - towards[:, :, None] * towards[:, None]
         information += np.einsum("n,nij->ij", weights, across)
         pull += weights @ turns
@@ -222,15 +213,15 @@ def _normal_equations(sights: Sights, axes: np.ndarray, width: float) -> tuple[n
 
 
 def _error(information: np.ndarray, axes: np.ndarray) -> float:
-    """Degrees expected of up: edges of one photo's side, each off by `_EDGE`, told it to so much."""
-    covariance = np.linalg.inv(information + 1e-6 * np.eye(3)) * math.radians(_EDGE) ** 2
+    """Degrees expected of up: edges of one photo's side, each off by `MANHATTAN.edge`, told it to so much."""
+    covariance = np.linalg.inv(information + 1e-6 * np.eye(3)) * math.radians(MANHATTAN.edge) ** 2
     sideways = axes[:, :2].T @ covariance @ axes[:, :2]
-    return float(min(90.0, max(_LEAST, math.degrees(math.sqrt(np.trace(sideways) / 4)))))
+    return float(min(90.0, max(MANHATTAN.least, math.degrees(math.sqrt(np.trace(sideways) / 4)))))
 
 
 def _agreement(sights: Sights, axes: np.ndarray) -> float:
     """How much speaks for three directions: logarithms of chances, of edges, of surfaces and of belief."""
-    up, width = axes[:, 2][None], _ROUNDS[-1]
+    up, width = axes[:, 2][None], MANHATTAN.rounds[-1]
     near = _near(np.abs(sights.edges @ axes), width).sum(1, keepdims=True)
     told = _likely(sights.lengths, near, width) + _surfaces_say(sights, up) + np.log(_held(sights, up))
     return float(told[0])

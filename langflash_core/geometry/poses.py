@@ -18,6 +18,7 @@ import numpy as np
 from jaxtyping import Float, Num
 
 from langflash_core.geometry import rotations
+from langflash_core.geometry.pinhole import Seen, see
 from langflash_core.geometry.reach import MIN_REACH
 from langflash_core.geometry.rotations import about
 
@@ -151,16 +152,10 @@ def to_camera(pose: Pose, width: int, height: int) -> "Camera":
 
 def project(
     points: Num[np.ndarray, "n 3"], pose: Pose, size: tuple[float, float]
-) -> tuple[Float[np.ndarray, "n 3"], Float[np.ndarray, "n 2"]] | None:
-    """Camera coordinates (n, 3) and pixels (n, 2) of world points in a picture of `size`; None where one is
-    not in front."""
-    matrix = viewmat(pose)
-    pos_c = points @ matrix[:3, :3].T + matrix[:3, 3]
-    if pos_c[:, 2].min() < NEAREST:
-        return None
-    K = intrinsics(pose, max(round(size[0]), 1), max(round(size[1]), 1))
-    across = pos_c[:, :2] if pose.span is not None else pos_c[:, :2] / pos_c[:, 2:]
-    return pos_c, across * K.diagonal()[:2] + K[:2, 2]
+) -> tuple[Float[np.ndarray, " n"], Float[np.ndarray, "n 2"]] | None:
+    """Depths and pixels of world points in a picture of `size`; None where one is not in front."""
+    seen = _see(points, pose, size)
+    return None if seen.z.min() < NEAREST else (seen.z, np.stack((seen.x, seen.y), 1))
 
 
 def visible(
@@ -168,14 +163,15 @@ def visible(
 ) -> Float[np.ndarray, "m 2 2"]:
     """The pieces between points of a line that lie in front, as pixels (m, start and end, 2) in a picture of
     `size`."""
-    matrix = viewmat(pose)
-    pos_c = line @ matrix[:3, :3].T + matrix[:3, 3]
-    ahead = pos_c[:, 2] >= NEAREST
-    K = intrinsics(pose, max(round(size[0]), 1), max(round(size[1]), 1))
-    depths = np.maximum(pos_c[:, 2:], NEAREST)
-    across = pos_c[:, :2] if pose.span is not None else pos_c[:, :2] / depths
-    pixels = across * K.diagonal()[:2] + K[:2, 2]
+    seen = _see(line, pose, size)
+    pixels, ahead = np.stack((seen.x, seen.y), 1), seen.z >= NEAREST
     return np.stack((pixels[:-1], pixels[1:]), 1)[ahead[:-1] & ahead[1:]]
+
+
+def _see(points: Num[np.ndarray, "n 3"], pose: Pose, size: tuple[float, float]) -> Seen:
+    """Points in the picture of a pose, of whole pixels, one at least."""
+    sides = max(round(size[0]), 1), max(round(size[1]), 1)
+    return see(points, viewmat(pose), intrinsics(pose, *sides), sides, orthographic=pose.span is not None)
 
 
 def orthographic(pose: Pose, low: Vector, high: Vector) -> Pose:

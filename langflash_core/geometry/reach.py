@@ -3,6 +3,8 @@
 import numpy as np
 from jaxtyping import Float
 
+from langflash_core.geometry.pinhole import see
+
 MIN_REACH = 0.02
 """Scene units; what is nearer is inside the lens."""
 
@@ -21,10 +23,6 @@ def median_reach(
     Returns:
         Depth in scene units; 1, the scene's own unit, when nothing is in front.
     """
-    pos_c = means @ viewmat[:3, :3].T + viewmat[:3, 3]
-    depths = pos_c[:, 2]
-    safe = np.where(depths > MIN_REACH, depths, np.inf)
-    x = pos_c[:, 0] / safe * K[0, 0] + K[0, 2]
-    y = pos_c[:, 1] / safe * K[1, 1] + K[1, 2]
-    middle = (abs(x / size[0] - 0.5) < 0.25) & (abs(y / size[1] - 0.5) < 0.25) & (depths > MIN_REACH)
-    return float(np.median(depths[middle])) if middle.any() else 1.0
+    x, y, z, inside = see(means, viewmat, K, size, MIN_REACH)
+    middle = inside & (abs(x / size[0] - 0.5) < 0.25) & (abs(y / size[1] - 0.5) < 0.25)
+    return float(np.median(z[middle])) if middle.any() else 1.0

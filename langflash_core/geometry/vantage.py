@@ -10,14 +10,7 @@ from jaxtyping import Float
 from torch import Tensor
 
 from langflash_core.geometry.cameras import invert_rigid
-
-_NEAR = 0.13
-"""Mean distance of photos to the nearest that leads, which is near enough: of 1.9 m past a room three or four
-lead, be it eight photos or 32. Each more has errors of its own, which hang beside the surfaces of the others:
-of 32 photos in two rooms 8 leaders gave 28.68 and 30.00 dB between, 4 of them 28.78 and 30.18; of eight
-photos all 8 gave 28.99 and 29.84, 3 and 4 of them 29.00 and 29.95, with 6 and 4 % fewer Gaussians."""
-_MANY, _SHARE = 9, 4
-"""Photos from which on at most one of so many leads, wherever they are."""
+from langflash_core.geometry.settings import VANTAGE
 
 
 def leading(depths: Float[Tensor, "V H W"], viewmats: Float[Tensor, "V 4 4"]) -> list[int]:
@@ -32,10 +25,10 @@ def leading(depths: Float[Tensor, "V H W"], viewmats: Float[Tensor, "V 4 4"]) ->
     count = len(depths)
     if count <= 2:
         return [*range(count)]
-    most = count if count < _MANY else -(-count // _SHARE)
+    most = count if count < VANTAGE.many else -(-count // VANTAGE.share)
     between, chosen = _between(depths, viewmats).sum(-1), []
     nearest = torch.full_like(between[0], torch.inf)
-    while len(chosen) < most and not float(nearest.mean()) <= _NEAR:
+    while len(chosen) < most and not float(nearest.mean()) <= VANTAGE.near:
         left = torch.minimum(nearest, between).sum(1)
         left[chosen] = torch.inf
         chosen.append(int(left.argmin()))

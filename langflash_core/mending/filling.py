@@ -30,7 +30,7 @@ from langflash_core.geometry.surfels import ellipses, spans
 from langflash_core.rig.projected import project_points
 from langflash_core.scene.joining import appended
 from langflash_core.scene.weights import sparse_weights
-from langflash_core.surface.exposure_compensation import GAIN_RANGE, LARGEST_OFFSET
+from langflash_core.surface.settings import EXPOSURE
 from langflash_core.types import Camera, Gaussians, Scene
 
 from .looks import Render, mattes
@@ -41,7 +41,7 @@ OPACITY = 0.99
 _COVER, _THIN = 0.85, 0.1  # deviation over spacing, as elements of a scene have
 _FINER, _MOST_SIDE = 2, 512  # than the views' own grid they are looked at; pixels of the longer side
 _MOST_VIEWS = 12  # with the largest holes
-_BRIGHTEST = GAIN_RANGE[1] + LARGEST_OFFSET  # what a photo's white may be in the scene's light
+_BRIGHTEST = EXPOSURE.gain_range[1] + EXPOSURE.largest_offset  # a photo's white in the scene's light
 _LEAST = 12  # pixels of a hole
 _RING = 0.08  # of the longer side: what counts as around
 _FAR = 0.012  # of the depth: what lies on a plane

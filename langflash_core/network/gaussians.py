@@ -17,13 +17,10 @@ from langflash_core.network.layers.dpt import DPT
 from langflash_core.network.occlusion import drawn_back, extended, over_edges
 from langflash_core.network.presets import Preset
 from langflash_core.network.prior import resize
+from langflash_core.network.settings import ELEMENTS
 from langflash_core.rig.rig import DepthMaps
 from langflash_core.types import Gaussians
 
-_COVER = 0.6  # standard deviation in pixel spacings: neighbours blend into a closed surface
-_THIN = 0.1  # thickness of a surface element over its pixel footprint
-_SCALE_RANGE = 1.0  # the head enlarges a scale by at most e
-_COLOUR_RANGE = 0.1  # and a colour by at most this
 CHANNELS = 1 + 3 + 3  # opacity, three scales, colour
 
 
@@ -53,8 +50,8 @@ def footprints(
     if edges is not None:
         pos_c, tangent_u, tangent_v = drawn_back(pos_c, tangent_u, tangent_v, edges)
     axes, deviations = ellipses(tangent_u, tangent_v)
-    in_plane = deviations * _COVER
-    thin = (_THIN * footprint)[..., None]
+    in_plane = deviations * ELEMENTS.cover
+    thin = (ELEMENTS.thin * footprint)[..., None]
     return pos_c, axes, torch.cat((torch.maximum(in_plane, thin), thin), -1)
 
 
@@ -117,8 +114,8 @@ def assemble_gaussians(
     # Never below the footprint that closes the surface: seen from nearer than the photo, where the
     # renderer's dilation of 0.3 px no longer helps, smaller ones would leave gaps. Nor larger at a jump.
     larger = torch.tanh(raw[..., 1:4]).clamp_min(0) * (edges == 0).all(-1, keepdim=True)
-    scales = scales * torch.exp(_SCALE_RANGE * larger)
-    colours = images.movedim(1, -1) + _COLOUR_RANGE * torch.tanh(raw[..., 4:])
+    scales = scales * torch.exp(ELEMENTS.scale_range * larger)
+    colours = images.movedim(1, -1) + ELEMENTS.colour_range * torch.tanh(raw[..., 4:])
     return Gaussians(
         means=means.reshape(-1, 3),
         quats=quats.reshape(-1, 4),

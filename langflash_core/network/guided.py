@@ -15,7 +15,7 @@ from langflash_core.base.many import FEW, groups_of, held, together
 from langflash_core.base.memory import give_back
 from langflash_core.base.running import Run
 from langflash_core.cameras.poses import Poses
-from langflash_core.cameras.retrieval import most_alike
+from langflash_core.cameras.retrieval import likeness
 from langflash_core.cameras.structure import (
     find_poses,
     found_lenses,
@@ -47,10 +47,11 @@ from langflash_core.network.semantics.second import SecondHead, both, looked_at
 from langflash_core.network.semantics.splitting import condensed, joint_maps, split_groups, split_maps
 from langflash_core.network.sweep import DepthRefiner
 from langflash_core.rig.neighbours import source_views
+from langflash_core.rig.pairs import best
 from langflash_core.rig.rig import DepthMaps, Rig
+from langflash_core.rig.settings import CHOICE
 from langflash_core.types import Gaussians, Views
 
-_READ = 15  # photos that each of many reads in the decoder
 _CLOSELY = 32  # photos, up to which language features are held at their full size
 
 
@@ -137,7 +138,7 @@ class GuidedDepthNet(LangFlashNet):
     def _alike(self, tokens: Tokens) -> list[list[int]]:
         """Of each view of one scene (B = 1) those most like it."""
         rows = F.normalize(tokens.hooks[self.refiner.match_hook][0].float(), dim=-1).cpu().numpy()
-        return most_alike(list(rows), _READ)
+        return [sorted(row) for row in best(likeness(list(rows)), CHOICE.read)]
 
     def _prior(self, levels: tuple[Tensor, ...], tokens: Tokens) -> DepthMaps:
         """Depth of one scene (B = 1), some views at a time."""

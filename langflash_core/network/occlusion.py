@@ -13,18 +13,13 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
-from langflash_core.geometry.jumps import steps_along, towards_nearer
-
-_UNDER = 10.0  # pixels: what a gap measures where depth is a twentieth off and the camera 20 degrees aside
-_JUMP = 0.2  # log depth from one pixel to the next
-_END = 0.05  # log depth, where a thing ends: below it, and below twice the step before, it is a slope
-_BACK = 0.3  # pixels by which the last element is drawn back
-_SHORT = 0.5  # and how long it is, of its length
+from langflash_core.geometry.surfels import steps_along, towards_nearer
+from langflash_core.network.settings import OCCLUSION
 
 
 def under_edges(log_depths: Float[Tensor, "V H W"]) -> Float[Tensor, "V H W 2"]:
     """(V, H, W, 2), as `towards_nearer` has them, of the jumps that a background goes on under."""
-    return towards_nearer(log_depths, _JUMP)
+    return towards_nearer(log_depths, OCCLUSION.jump)
 
 
 def over_edges(log_depths: Float[Tensor, "V H W"]) -> Float[Tensor, "V H W 2"]:
@@ -33,8 +28,8 @@ def over_edges(log_depths: Float[Tensor, "V H W"]) -> Float[Tensor, "V H W 2"]:
     signs = []
     for dim in (-1, -2):
         after, before = steps_along(log_depths, dim)
-        ends = after > (2 * before.abs()).clamp_min(_END)
-        begins = before > (2 * after.abs()).clamp_min(_END)
+        ends = after > (2 * before.abs()).clamp_min(OCCLUSION.end)
+        begins = before > (2 * after.abs()).clamp_min(OCCLUSION.end)
         signs.append(ends.to(log_depths) - begins.to(log_depths))
     return torch.stack(signs, -1)
 
@@ -48,8 +43,8 @@ def drawn_back(
     """Points and the tangents that span their elements (V, H, W, 3); those at `edges` (V, H, W, 2), as
     `over_edges` has them, are away from the jump and shorter across it."""
     across, down = edges[..., :1], edges[..., 1:]
-    pos_c = pos_c - _BACK * (across * tangent_u + down * tangent_v)
-    shorter = 1 - (1 - _SHORT) * edges.abs()
+    pos_c = pos_c - OCCLUSION.back * (across * tangent_u + down * tangent_v)
+    shorter = 1 - (1 - OCCLUSION.short) * edges.abs()
     return pos_c, tangent_u * shorter[..., :1], tangent_v * shorter[..., 1:]
 
 
@@ -60,14 +55,14 @@ def extended(
     Ks: Float[Tensor, "V 3 3"],
 ) -> tuple[Float[Tensor, "V H W 3"], Float[Tensor, "V H W 3"]]:
     """Points and scales (V, H, W, 3) in the camera's frame; those on the farther side of a jump are moved by
-    half of `_UNDER` pixels and, within the surface, as wide.
+    half of `OCCLUSION.under` pixels and, within the surface, as wide.
 
     Args:
         log_depths: (V, H, W) of the points. Ks: (V, 3, 3) pixels.
     """
     signs = under_edges(log_depths)
     lengths = signs.norm(dim=-1, keepdim=True)
-    half = (_UNDER / 2 * log_depths.exp() / Ks[:, 0, 0, None, None])[..., None]
+    half = (OCCLUSION.under / 2 * log_depths.exp() / Ks[:, 0, 0, None, None])[..., None]
     move = torch.cat((signs / lengths.clamp_min(1) * half, torch.zeros_like(half)), -1)
     wider = torch.cat((torch.maximum(scales[..., :2], half), scales[..., 2:]), -1)
     return pos_c + move, torch.where(lengths > 0, wider, scales)

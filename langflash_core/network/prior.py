@@ -11,11 +11,8 @@ from torch.nn import functional as F
 from langflash_core.network.encoders.shared import Tokens
 from langflash_core.network.layers.dpt import DPT
 from langflash_core.network.presets import Preset
+from langflash_core.network.settings import PRIOR
 from langflash_core.rig.rig import DepthMaps
-
-_TYPICAL_LOG_DEPTH = 0.8  # log of 2.2 m: where an untrained head starts
-_LOG_RANGE = (-4.0, 5.0)  # 2 cm to 150 m: exp never overflows
-LOG_ERROR_RANGE = (-5.0, 1.0)
 
 
 def resize(maps: Float[Tensor, "n C _ _"], size: tuple[int, int]) -> Float[Tensor, "n C H W"]:
@@ -52,5 +49,5 @@ class DepthHead(nn.Module):
         raw = self.head(self.dpt(maps).path_1).float()
         size = (tokens.grid[0] * self.patch, tokens.grid[1] * self.patch)
         raw = resize(raw, size).unflatten(0, tokens.shape)
-        log_depths = (raw[:, :, 0] + _TYPICAL_LOG_DEPTH).clamp(*_LOG_RANGE)
-        return DepthMaps(log_depths, (raw[:, :, 1] - 1.5).clamp(*LOG_ERROR_RANGE))
+        log_depths = (raw[:, :, 0] + PRIOR.typical_log_depth).clamp(*PRIOR.log_range)
+        return DepthMaps(log_depths, (raw[:, :, 1] + PRIOR.typical_log_error).clamp(*PRIOR.log_error_range))

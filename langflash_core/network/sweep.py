@@ -20,13 +20,11 @@ from langflash_core.geometry.cameras import invert_rigid, rays
 from langflash_core.network.encoders.shared import Tokens
 from langflash_core.network.layers.dpt import ResidualUnit
 from langflash_core.network.presets import GuidedDepth
-from langflash_core.network.prior import LOG_ERROR_RANGE, resize
+from langflash_core.network.prior import resize
+from langflash_core.network.settings import PRIOR
 from langflash_core.rig.neighbours import Neighbours, everyone
 from langflash_core.rig.projected import see_points
 from langflash_core.rig.rig import DepthMaps
-
-_TYPICAL_LOG_ERROR = -1.5  # centres the error channel that the network reads
-_AT_ONCE = 10_000  # places whose vectors are gathered together
 
 
 @dataclass(frozen=True)
@@ -116,7 +114,7 @@ def _products(compared: Compared, view: int, other: int, ndc: Tensor) -> Tensor:
 
     Some pixels at a time: what was gathered of them stays in a processor's cache.
     """
-    at_once = max(1, _AT_ONCE // ndc.shape[2])
+    at_once = max(1, PRIOR.at_once // ndc.shape[2])
     table, own = compared.table[other], compared.own[view]
     parts = zip(ndc.split(at_once, 1), own.split(at_once), strict=True)
     return torch.cat([torch.bmm(gathered(table, compared.size, there), here) for there, here in parts])
@@ -273,7 +271,7 @@ class DepthRefiner(nn.Module):
         change = resize(torch.stack((shift, raw[:, -1]), 1), _size(prior.log_depths)).unflatten(0, shape)
         return DepthMaps(
             prior.log_depths + change[:, :, 0],
-            (prior.log_errors + change[:, :, 1]).clamp(*LOG_ERROR_RANGE),
+            (prior.log_errors + change[:, :, 1]).clamp(*PRIOR.log_error_range),
         )
 
     def _sweep(
@@ -308,4 +306,4 @@ def _size(maps: Tensor) -> tuple[int, int]:
 def _centred(maps: Tensor) -> Tensor:
     """Log depth about its mean and log error about a typical one, (n, 2, h, w): no unit left."""
     logs, errors = maps[:, 0], maps[:, 1]
-    return torch.stack((logs - logs.mean((1, 2), keepdim=True), errors - _TYPICAL_LOG_ERROR), 1)
+    return torch.stack((logs - logs.mean((1, 2), keepdim=True), errors - PRIOR.typical_log_error), 1)

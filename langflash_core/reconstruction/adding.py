@@ -17,7 +17,7 @@ from jaxtyping import Float
 from torch import Tensor
 
 from langflash_core.base.records import FoundFocal, FoundLens
-from langflash_core.cameras.keypoints import WORKING_SIDE, KeyPoints, match_with
+from langflash_core.cameras.keypoints import KeyPoints, match_sources
 from langflash_core.cameras.placing import place_camera
 from langflash_core.errors import InputError
 from langflash_core.geometry.cameras import fov_degrees
@@ -26,19 +26,10 @@ from langflash_core.images.lens import ASSUMED_FOV, exif_fov
 from langflash_core.images.pictures import MAX_PHOTOS
 from langflash_core.images.straight import straightened
 from langflash_core.images.views import load_views
-from langflash_core.rig.settings import PAIRING
+from langflash_core.rig.settings import ADDING, MATCHING, PAIRING
 from langflash_core.surface.added import Shared, add_layers
 from langflash_core.surface.foreseen import CELL, draw_points
 from langflash_core.types import Lenses, Scene, Views
-
-BESIDE = 4
-"""Photos of the scene that each new one is reconstructed with: a view is blended of as many."""
-SAME_LENS = 0.5
-"""Degrees by which recorded fields of view of one lens differ: of a millimetre of some 26, to which they are
-rounded."""
-MISSES = 4.0
-"""Pixels of the photo at `WORKING_SIDE` by which a point of the scene may miss its key point: a fiftieth of
-its depth, from a fifth of the distance aside, at a focal length of 700 are 3."""
 
 Make = Callable[[Sequence[Path], Sequence[float], Float[Tensor, "V 4 4"]], Scene]
 
@@ -58,7 +49,9 @@ def scene_with(
     """
     _check(scene, len(photos))
     views = [_view(scene, path, check) for path in photos]
-    matches = match_with(scene.photos, [view.sources[0] for view in views], check)
+    known = range(scene.num_views)
+    pairs = [(old, len(known) + new) for new in range(len(views)) for old in known]
+    matches = match_sources((*scene.photos, *(view.sources[0] for view in views)), check, pairs=pairs)
     placed = [_place(scene, matches, number, view) for number, view in enumerate(views)]
     beside = sorted({other for one in placed for other in one.beside})
     sources = [*(scene.photos[view] for view in beside), *(view.sources[0] for view in views)]
@@ -93,7 +86,7 @@ def _lens(scene: Scene, photo: PhotoFacts) -> FoundLens | None:
     nothing."""
     said = exif_fov(photo)
     for known in scene.record.lens.get("found", ()):
-        if abs(known["said"] - (ASSUMED_FOV if said is None else said)) < SAME_LENS:
+        if abs(known["said"] - (ASSUMED_FOV if said is None else said)) < ADDING.same_lens:
             return FoundLens(**known)
     return None if said is None else FoundLens(said, 0.0, 1, said, True)
 
@@ -135,9 +128,11 @@ class _Placed:
 def _place(scene: Scene, matches: KeyPoints, number: int, view: Views) -> _Placed:
     """By the places that its key points have in the layers of the photos that have them, too."""
     row = scene.num_views + number
-    beside = sorted(range(scene.num_views), key=lambda other: -len(matches.pairs[other, row]))[:BESIDE]
+    beside = sorted(range(scene.num_views), key=lambda other: -len(matches.pairs[other, row]))[
+        : ADDING.beside
+    ]
     K = view.Ks[0].double().clone()
-    K[:2] *= WORKING_SIDE / max(view.size)
+    K[:2] *= MATCHING.working_side / max(view.size)
     points, pixels = [], []
     for other in beside:
         ours, own = matches.pairs[other, row].T
@@ -145,7 +140,7 @@ def _place(scene: Scene, matches: KeyPoints, number: int, view: Views) -> _Place
         pixels.append(matches.positions[row][own])
     points, pixels = np.concatenate(points), np.concatenate(pixels)
     solid = np.isfinite(points).all(1)
-    placed = place_camera(points[solid], pixels[solid], K.numpy(), MISSES)
+    placed = place_camera(points[solid], pixels[solid], K.numpy(), ADDING.misses)
     if placed is None or placed.agree.sum() < PAIRING.few:
         raise InputError(
             f"{view.names[0]} could not be placed beside the scene's photos; take one that shows half of "
@@ -155,11 +150,11 @@ def _place(scene: Scene, matches: KeyPoints, number: int, view: Views) -> _Place
 
 
 def _seen_at(scene: Scene, view: int, pixels: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, "n 3"]:
-    """Points of the world that a photo's own layer shows at key points, pixels at `WORKING_SIDE`; no numbers
+    """Points of the world that a photo's own layer shows at key points (`KeyPoints.positions`); no numbers
     where it shows none."""
     means, camera = scene.layer(view).gaussians.means.T, scene.camera(view)
     points, depths = draw_points(means, means, camera)
-    cells = torch.from_numpy(pixels * max(scene.view_size) / WORKING_SIDE / CELL).long()
+    cells = torch.from_numpy(pixels * max(scene.view_size) / MATCHING.working_side / CELL).long()
     x, y = (cells[:, axis].clamp(0, side - 1) for axis, side in enumerate(reversed(depths.shape)))
     there = torch.isfinite(depths[y, x])
     return torch.where(there[:, None], points[:, y, x].T.double(), torch.nan).numpy()

@@ -1,24 +1,30 @@
 """What the network finds in the views, kept where a folder for that was named."""
 
+import json
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import asdict, fields, replace
 from pathlib import Path
 
+import numpy as np
 import torch
 from torch import Tensor
 
-from langflash_core.base.keeping import Keep, not_kept
+from langflash_core.base.keeping import Arrays, Keep, not_kept
+from langflash_core.base.records import FoundFocal, FoundLens
 from langflash_core.base.running import Kept, Run
 from langflash_core.errors import WeightsError
 from langflash_core.network import PRESETS
 from langflash_core.network.checkpoints.parts import part_folder
 from langflash_core.network.checkpoints.stored import weights_file
 from langflash_core.reconstruction.ahead import Ahead
-from langflash_core.reconstruction.kept_prediction import arrays_of, prediction_of
 from langflash_core.reconstruction.options import Options
 from langflash_core.reconstruction.tools import Tools
-from langflash_core.types import Prediction, Views
+from langflash_core.types import Gaussians, Prediction, Views
+
+_SAID = "said"
+_OWN = "gaussians."
+_TENSORS = ("weights", "dictionary", "viewmats", "depths", "confidences", "Ks")
 
 
 def predictor(options: Options, tools: Tools, ahead: Ahead, run: Run) -> Callable[[Views], Prediction]:
@@ -75,3 +81,46 @@ def _identity(preset: str, weights: Path | str | None) -> list[tuple[str, int, i
     with suppress(WeightsError):  # there may be no file but the parts
         files.append(weights_file(preset, None if weights is None else Path(weights)))
     return [(path.name, path.stat().st_size, path.stat().st_mtime_ns) for path in files if path.is_file()]
+
+
+def arrays_of(prediction: Prediction) -> Arrays:
+    """All of a prediction, on the CPU, to be kept."""
+    said = {
+        "space": prediction.space,
+        "unplaced": prediction.unplaced,
+        "warnings": prediction.warnings,
+        "timings": prediction.timings,
+        "lenses": [asdict(lens) for lens in prediction.lenses],
+        "bent": [lens and asdict(lens) for lens in prediction.bent],
+    }
+    found = {_SAID: np.frombuffer(json.dumps(said).encode(), np.uint8)}
+    for name in _TENSORS:
+        values = getattr(prediction, name)
+        if values is not None:
+            found[name] = values.detach().cpu().numpy()
+    for each in fields(Gaussians):
+        values = getattr(prediction.gaussians, each.name)
+        if isinstance(values, Tensor):
+            found[_OWN + each.name] = values.detach().cpu().numpy()
+    return found
+
+
+def prediction_of(arrays: Arrays) -> Prediction:
+    """The one that `arrays_of` had, to the same bits."""
+    said = json.loads(bytes(arrays[_SAID]))
+    own = {
+        each.name: torch.from_numpy(arrays[_OWN + each.name])
+        for each in fields(Gaussians)
+        if _OWN + each.name in arrays
+    }
+    tensors = {name: torch.from_numpy(arrays[name]) for name in _TENSORS if name in arrays}
+    return Prediction(
+        gaussians=Gaussians(**own),
+        space=said["space"],
+        unplaced=tuple(said["unplaced"]),
+        warnings=tuple(said["warnings"]),
+        timings=said["timings"],
+        lenses=tuple(FoundLens(**lens) for lens in said["lenses"]),
+        bent=tuple(lens and FoundFocal(**lens) for lens in said["bent"]),
+        **tensors,
+    )

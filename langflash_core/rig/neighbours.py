@@ -21,6 +21,8 @@ from jaxtyping import Float
 from torch import Tensor
 from torch.nn import functional as F
 
+from langflash_core.geometry.cameras import invert_rigid
+from langflash_core.geometry.nearness import Chosen, Nearness
 from langflash_core.rig.rig import Rig
 from langflash_core.rig.settings import CHOICE, Choice
 
@@ -58,6 +60,15 @@ def source_views(
 ) -> Neighbours:
     """Of each photo its `neighbours`."""
     return [neighbours(rig, view, by, most, settings=settings) for view in range(len(rig))]
+
+
+def beside(rig: Rig, view: int) -> Chosen:
+    """The other photos that a picture at a photo's place would be drawn from, and what each counts there."""
+    poses = rig.viewmats.double()
+    centres, axes = invert_rigid(poses)[:, :3, 3].cpu().numpy(), poses[:, 2, :3].cpu().numpy()
+    others = [other for other in range(len(rig)) if other != view]
+    distance = float(rig.depths[view].nanmedian())
+    return Nearness(centres[others], axes[others], distance, tuple(others)).seen(centres[view], axes[view])
 
 
 def witnesses(

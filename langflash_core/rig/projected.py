@@ -7,6 +7,8 @@ import torch
 from jaxtyping import Bool, Float, Int, Shaped
 from torch import Tensor
 
+from langflash_core.geometry.pinhole import to_pixels
+
 
 @dataclass(frozen=True)
 class Projected:
@@ -70,6 +72,4 @@ def see_points(
     are divided.
     """
     x, y, z = points.unbind(-2)
-    ahead = z.clamp_min(eps)
-    across = x / ahead * Ks[..., 0, 0, None] + Ks[..., 0, 2, None]
-    return Projected(across, y / ahead * Ks[..., 1, 1, None] + Ks[..., 1, 2, None], z, size)
+    return Projected(*to_pixels(x, y, z.clamp_min(eps), Ks), z, size)

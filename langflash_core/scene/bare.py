@@ -14,6 +14,7 @@ from jaxtyping import Float, Integer
 from torch import Tensor
 
 from langflash_core.geometry.cameras import intrinsics_from_fov
+from langflash_core.geometry.pinhole import from_pixels
 from langflash_core.types import NO_LANGUAGE, Camera, Gaussians, Record, Scene, Semantics
 
 VIEW_SIZE = (960, 720)  # pixels
@@ -108,7 +109,7 @@ def _from_outside(means: Tensor, width: float) -> Camera:
     signs = torch.cartesian_prod(*[torch.tensor([-1.0, 1.0], dtype=torch.float64)] * 3)
     corners = (signs * half) @ axes.T  # (8, 3), camera axes, around the centre
     K = intrinsics_from_fov(_FOV, *VIEW_SIZE)
-    tangents = torch.tensor(VIEW_SIZE) / 2 / K.diagonal()[:2]
+    tangents = from_pixels(torch.tensor(VIEW_SIZE), K)
     distance = float((corners[:, :2].abs() / tangents - corners[:, 2:]).max())
     viewmat = torch.eye(4)
     viewmat[:3, :3] = axes

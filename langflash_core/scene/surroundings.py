@@ -15,7 +15,8 @@ import numpy as np
 from jaxtyping import Bool, Float, Integer
 
 from langflash_core.geometry.nearness import Nearness
-from langflash_core.geometry.poses import NEAREST, Pose, intrinsics
+from langflash_core.geometry.pinhole import see
+from langflash_core.geometry.poses import NEAREST, Pose, intrinsics, viewmat
 
 if TYPE_CHECKING:
     from langflash_core.types import Scene
@@ -111,17 +112,12 @@ class Surroundings:
         self, pose: Pose
     ) -> tuple[Float[np.ndarray, " m"], Float[np.ndarray, "m 2"], float, Integer[np.ndarray, " m"]]:
         """Depths and cells of the samples in a picture, cells per unit at depth 1, and which samples."""
-        pos_c = (self.places - np.array(pose.centre)) @ pose.axes
         wide = 1000 if pose.aspect >= 1 else round(1000 * pose.aspect)
         high = round(wide / pose.aspect)
-        scale = np.array(CELLS) / (wide, high)
-        K = intrinsics(pose, wide, high)
-        focal, middle = K.diagonal()[:2] * scale, K[:2, 2] * scale
-        divisor = np.ones(1) if pose.span is not None else np.maximum(pos_c[:, 2], NEAREST)
-        x, y = pos_c[:, 0] * focal[0] / divisor + middle[0], pos_c[:, 1] * focal[1] / divisor + middle[1]
-        within = (x >= 0) & (x < CELLS[0]) & (y >= 0) & (y < CELLS[1]) & (pos_c[:, 2] > NEAREST)
+        K = intrinsics(pose, wide, high) * np.array([[CELLS[0] / wide], [CELLS[1] / high], [1.0]])
+        x, y, z, within = see(self.places, viewmat(pose), K, CELLS, NEAREST, pose.span is not None)
         inside = np.flatnonzero(within)
-        return pos_c[inside, 2], np.stack((x[inside], y[inside]), 1), float(focal[0]), inside
+        return z[inside], np.stack((x[inside], y[inside]), 1), float(K[0, 0]), inside
 
 
 def surroundings_of(scene: "Scene") -> Surroundings | None:
@@ -148,20 +144,17 @@ def _sampled(
 ) -> tuple[Integer[np.ndarray, " n"], Float[np.ndarray, " n"], Float[np.ndarray, "n 3"]]:
     """Rows, sizes and eyes of a photo's samples, of `count` photos: of each cell of its grid the Gaussians at
     `QUANTILES` of depth."""
-    viewmat, K = scene.viewmats[view].double().numpy(), scene.Ks[view].double().numpy()
+    matrix, K = scene.viewmats[view].double().numpy(), scene.Ks[view].double().numpy()
     width, height = scene.view_size
     cells_each = min(A_PHOTO, MOST / len(QUANTILES) / count)
     wide = round(math.sqrt(cells_each * width / height)) or 1
     cell = width / wide
     high = math.ceil(height / cell)
-    pos_c = means[own] @ viewmat[:3, :3].T + viewmat[:3, 3]
-    ahead = np.maximum(pos_c[:, 2], NEAREST)
-    pixels = pos_c[:, :2] / ahead[:, None] * K.diagonal()[:2] + K[:2, 2]
-    x, y = np.nan_to_num(pixels / cell, nan=-1.0).clip(-1, 1e6).astype(int).T
-    seen = np.flatnonzero((pos_c[:, 2] > NEAREST) & (x >= 0) & (x < wide) & (y >= 0) & (y < high))
-    cells = y[seen] * wide + x[seen]
-    order = np.lexsort((ahead[seen], cells))
+    x, y, z, inside = see(means[own], matrix, K, (wide * cell, high * cell), NEAREST)
+    seen = np.flatnonzero(inside)
+    cells = (y[seen] / cell).astype(int) * wide + (x[seen] / cell).astype(int)
+    order = np.lexsort((z[seen], cells))
     _, starts, counts = np.unique(cells[order], return_index=True, return_counts=True)
     picked = seen[order[np.unique([starts + (share * counts).astype(int) for share in QUANTILES])]]
-    centre = -viewmat[:3, :3].T @ viewmat[:3, 3]
-    return own[picked], ahead[picked] * cell / float(K[0, 0]), np.tile(centre, (len(picked), 1))
+    centre = -matrix[:3, :3].T @ matrix[:3, 3]
+    return own[picked], z[picked] * cell / float(K[0, 0]), np.tile(centre, (len(picked), 1))

@@ -13,6 +13,7 @@ import torch
 from jaxtyping import Bool, Float
 
 from langflash_core.geometry.nearness import Nearness
+from langflash_core.geometry.pinhole import see
 from langflash_core.types import Camera, Scene
 
 from .projection import NEAR
@@ -53,13 +54,12 @@ def silhouette(
     viewmat, K = camera.viewmat.cpu().double().numpy(), camera.K.cpu().double().numpy()
     means = scene.gaussians.means.detach().cpu().numpy()[rows]
     with np.errstate(all="ignore"):
-        x, y, z = viewmat[:3, :3] @ means.T + viewmat[:3, 3:]
+        size = camera.width, camera.height
+        x, y, z, inside = see(means, viewmat, K, size, NEAR, camera.orthographic)
         depths = 1.0 if camera.orthographic else np.maximum(z, NEAR)
-        u, v = x / depths * K[0, 0] + K[0, 2], y / depths * K[1, 1] + K[1, 2]
         scales = np.partition(scene.gaussians.scales.detach().cpu().numpy()[rows], 1, axis=1)
         wide = (scales[:, 1] / depths * K[0, 0]).clip(0, _WIDEST)
-        inside = (z > NEAR) & (u >= 0) & (u < camera.width) & (v >= 0) & (v < camera.height)
-    lines, columns = v[inside].astype(int), u[inside].astype(int)
+    lines, columns = y[inside].astype(int), x[inside].astype(int)
     own, z, steps = part[rows][inside], z[inside], np.round(np.nan_to_num(wide[inside])).astype(int)
     whole = _nearest(z, lines, columns, steps, none.shape)
     some = _nearest(z[own], lines[own], columns[own], steps[own], none.shape)

@@ -13,6 +13,7 @@ from jaxtyping import Bool, Float, Int
 from torch import Tensor
 
 from langflash_core.geometry.nearness import Nearness
+from langflash_core.geometry.pinhole import from_pixels, see
 from langflash_core.types import Camera, Gaussians, Scene, Semantics
 
 from .compose import DEPTH, shares
@@ -70,19 +71,18 @@ def _may_touch(
         return np.zeros(len(gaussians), bool)
     viewmat, K = camera.viewmat.cpu().double().numpy(), camera.K.cpu().double().numpy()
     with np.errstate(all="ignore"):  # what is not finite touches nothing
-        x, y, z = viewmat[:3, :3] @ gaussians.means.cpu().numpy().T + viewmat[:3, 3:]
+        size, means = (camera.width, camera.height), gaussians.means.cpu().numpy()
+        x, y, z, _ = see(means, viewmat, K, size, 1e-9, camera.orthographic)
         depths = 1.0 if camera.orthographic else np.maximum(z, 1e-9)
         steep = 0.0
         if not camera.orthographic:
-            size = np.array([camera.width, camera.height])
-            focal, middle = np.diag(K)[:2], K[:2, 2]
-            reach = np.maximum(middle, size - middle) / focal + TAN_MARGIN * 0.5 * size / focal
+            reach = np.maximum(-from_pixels(np.zeros(2), K), from_pixels(np.array(size), K))
+            reach += TAN_MARGIN * 0.5 * np.array(size) / np.diag(K)[:2]
             steep = float(reach @ reach)
         wide = gaussians.scales.cpu().numpy().max(1) / depths * max(K[0, 0], K[1, 1])
         far = np.sqrt(2 * np.log(1 / ALPHA_MIN)) * np.sqrt(wide**2 * (1 + steep) + DILATION) + 1.0
-        u, v = x / depths * K[0, 0] + K[0, 2], y / depths * K[1, 1] + K[1, 2]
-        across = (u >= columns[0] - far) & (u <= columns[-1] + 1 + far)
-        return across & (v >= lines[0] - far) & (v <= lines[-1] + 1 + far)
+        across = (x >= columns[0] - far) & (x <= columns[-1] + 1 + far)
+        return across & (y >= lines[0] - far) & (y <= lines[-1] + 1 + far)
 
 
 def _seen_in_layers(

@@ -13,9 +13,8 @@ from langflash_core.geometry.cameras import invert_rigid
 from langflash_core.rig.rig import Rig
 from langflash_core.scene.weights import sparse_weights
 from langflash_core.surface.consistency import seen_through
+from langflash_core.surface.settings import PRUNING
 from langflash_core.types import Cost, Gaussians, Prediction, Record, Scene, Semantics, Views
-
-MIN_SCALE = 1e-7  # scene units; below it a covariance is singular in float32
 
 
 def assemble(prediction: Prediction, views: Views, *, top_m: int = 8, preset: str = "mini") -> Scene:
@@ -149,14 +148,14 @@ def _usable(gaussians: Gaussians) -> Tensor:
 
 
 def normalised(gaussians: Gaussians, unit: float) -> Gaussians:
-    """In units of `unit`, quaternions of unit norm, scales not below `MIN_SCALE`."""
+    """In units of `unit`, quaternions of unit norm, scales not below `PRUNING.min_scale`."""
     norms = gaussians.quats.float().norm(dim=-1, keepdim=True)
     identity = torch.tensor([1.0, 0, 0, 0], device=norms.device)
     quats = torch.where(norms > 1e-6, gaussians.quats.float() / norms.clamp_min(1e-6), identity)
     return Gaussians(
         means=gaussians.means.float() / unit,
         quats=quats,
-        scales=(gaussians.scales.float() / unit).clamp_min(MIN_SCALE),
+        scales=(gaussians.scales.float() / unit).clamp_min(PRUNING.min_scale),
         opacities=gaussians.opacities.float().clamp(0, 1),
         sh=gaussians.sh.float(),
     )

@@ -17,15 +17,13 @@ from jaxtyping import Bool, Float, Int, Shaped
 from torch import Tensor
 from torch.nn import functional as F
 
-from langflash_core.surface.upsampling import JUMP
+from langflash_core.surface.settings import BLOCKS, UPSAMPLING
 
 LEVELS = 4
 LARGEST = 2**LEVELS
 """Pixels, side of the largest squares."""
 _COSTS = (3, 4, *[3] * (LEVELS - 2))
 """Leaves that a parting adds, by level from the finest: one more goes beneath a square of 4 x 4 pixels."""
-_CLEAR = (0.5, 1.2)  # sides that must be clear around fine and around coarse squares
-_BENT = 0.01  # log depth by which the middle of a square may be off its corners' mean
 
 
 @dataclass(frozen=True)
@@ -69,7 +67,7 @@ def grown(
     colours, depths = padded(photo), padded(log_depths[None])[0]
     needed = padded(wanted[None].float())[0]
     needed[size[0] :], needed[:, size[1] :] = 0, 0
-    jumps = (depths.diff(dim=1).abs() > JUMP, depths.diff(dim=0).abs() > JUMP)
+    jumps = (depths.diff(dim=1).abs() > UPSAMPLING.jump, depths.diff(dim=0).abs() > UPSAMPLING.jump)
     near = -padded(clear.clamp(max=4 * LARGEST)[None])
     squares, errors = colours.square().sum(0), torch.zeros_like(depths)
     gains: list[Tensor] = []
@@ -81,7 +79,7 @@ def grown(
         gain = (errors - _fours(finer[None])[0]) / 3
         near = F.max_pool2d(near[None], 2)[0]
         must = (
-            (-near[0] < _CLEAR[side >= 4] * side)
+            (-near[0] < BLOCKS.clear[side >= 4] * side)
             | _jumping(jumps, level)
             | (_bent(depths, side) if level > 1 else gain < 0)
         )
@@ -153,7 +151,7 @@ def _bent(depths: Tensor, side: int) -> Tensor:
     """Squares whose middle is off the mean of their corners."""
     first, last, half = slice(0, None, side), slice(side - 1, None, side), slice(side // 2, None, side)
     corners = depths[first, first] + depths[first, last] + depths[last, first] + depths[last, last]
-    return (corners / 4 - depths[half, half]).abs() > _BENT
+    return (corners / 4 - depths[half, half]).abs() > BLOCKS.bent
 
 
 def _squares(chosen: Tensor, level: int, size: tuple[int, int]) -> Squares:

@@ -32,8 +32,7 @@ from jaxtyping import Float, Float32, Integer
 from torch import Tensor
 from torch.nn import functional as F
 
-_WINDOW, _SPREAD = 5, 2.0  # pixels: diameter and standard deviation of the bilateral filter
-_LIKE = 1e-6  # of a grid pixel of another colour; where all four are, they count as bilinear
+from langflash_core.surface.settings import BORDERS
 
 
 @dataclass(frozen=True)
@@ -85,7 +84,7 @@ class RefinedWeights:
             for x, share_x in ((left, 1 - right), ((left + 1).clamp_max(width - 1), right)):
                 place = y * width + x
                 apart = (colours[:, place] - own).square().sum(0)
-                alike = torch.exp(apart / (-2 * self.rule.colour**2)) + _LIKE
+                alike = torch.exp(apart / (-2 * self.rule.colour**2)) + BORDERS.like
                 places.append(place)
                 shares.append(share_y * share_x * alike)
         taps = torch.stack(shares, 1)  # (n, 4)
@@ -163,12 +162,12 @@ class _Lines:
 
 
 def quieted(picture: Float32[np.ndarray, "3 H W"], noise: float) -> Float32[np.ndarray, "3 H W"]:
-    """The picture without its noise, edges as they were: a bilateral filter of `_WINDOW` pixels.
+    """The picture without its noise, edges as they were: a bilateral filter of `BORDERS.window` pixels.
 
     Source: Tomasi and Manduchi, Bilateral Filtering for Gray and Color Images, ICCV 1998.
     """
     pixels = np.ascontiguousarray(picture.transpose(1, 2, 0))
-    return cv2.bilateralFilter(pixels, _WINDOW, noise, _SPREAD).transpose(2, 0, 1)
+    return cv2.bilateralFilter(pixels, BORDERS.window, noise, BORDERS.spread).transpose(2, 0, 1)
 
 
 def _likeness(

@@ -11,7 +11,7 @@ from jaxtyping import Float
 from torch import Tensor
 from torch.nn import functional as F
 
-from langflash_core.surface.upsampling import JUMP
+from langflash_core.surface.settings import UPSAMPLING
 
 
 def clearances(log_depths: Float[Tensor, "h w"]) -> Float[Tensor, "h w"]:
@@ -30,7 +30,7 @@ def clearances(log_depths: Float[Tensor, "h w"]) -> Float[Tensor, "h w"]:
     there = torch.from_numpy(labels)
     of_label = log_depths.new_zeros(int(there.max()) + 1)
     of_label[there[ends].long()] = log_depths[ends]
-    behind = log_depths - of_label[there.long()] > JUMP
+    behind = log_depths - of_label[there.long()] > UPSAMPLING.jump
     return torch.where(behind, torch.inf, torch.from_numpy(distances) + 0.5)
 
 
@@ -38,4 +38,4 @@ def _ends(log_depths: Tensor) -> Tensor:
     """(h, w) bool: the last pixels of a surface before a farther one."""
     wide = F.pad(log_depths[None, None], (1,) * 4, mode="replicate")[0, 0]
     beside = (wide[1:-1, 2:], wide[1:-1, :-2], wide[2:, 1:-1], wide[:-2, 1:-1])
-    return torch.stack([other - log_depths > JUMP for other in beside]).any(0)
+    return torch.stack([other - log_depths > UPSAMPLING.jump for other in beside]).any(0)

@@ -23,11 +23,8 @@ from torch import Tensor
 
 from langflash_core.splat.mixing import mixing
 from langflash_core.splat.projection import project
+from langflash_core.surface.settings import COLOURS
 from langflash_core.types import Camera, Gaussians
-
-ROUNDS = 8
-_LEAST = 0.5  # of a pixel's light, from which a picture says what is wrong there
-_SEEN = 0.05  # contributions of a Gaussian over all pixels, below which its colour stays
 
 
 @dataclass(frozen=True)
@@ -46,7 +43,7 @@ def solved_colours(
     start: Float[Tensor, "N 3"],
     camera: Camera,
     photo: Float[Tensor, "3 h w"],
-    rounds: int = ROUNDS,
+    rounds: int = COLOURS.rounds,
 ) -> Solved:
     """Colours of Gaussians from the photo that a camera took.
 
@@ -79,15 +76,17 @@ class _Drawn:
     def of(matrix: scipy.sparse.csr_matrix, photo: Tensor) -> "_Drawn":
         light = np.asarray(matrix.sum(1)).ravel()
         flat = photo.movedim(0, -1).flatten(0, 1).cpu().numpy().astype(np.float32)
-        shown = (light >= _LEAST) & np.isfinite(flat).all(1)
+        shown = (light >= COLOURS.least) & np.isfinite(flat).all(1)
         flat[~shown] = 0
-        matrix.data *= np.repeat(shown / np.maximum(light, _LEAST), np.diff(matrix.indptr)).astype(np.float32)
+        matrix.data *= np.repeat(shown / np.maximum(light, COLOURS.least), np.diff(matrix.indptr)).astype(
+            np.float32
+        )
         sums = matrix.T @ np.ones((len(flat), 1), np.float32)
         return _Drawn(matrix, flat, shown[:, None].astype(np.float32), sums)
 
     def solved(self, start: np.ndarray, rounds: int) -> np.ndarray:
         """Colours (n, 3) after some rounds."""
-        steps = np.where(self.sums > _SEEN, 1 / np.maximum(self.sums, _SEEN), 0)
+        steps = np.where(self.sums > COLOURS.seen, 1 / np.maximum(self.sums, COLOURS.seen), 0)
         colours = ahead = start
         pace = 1.0
         for _ in range(rounds):

@@ -7,19 +7,11 @@ from torch.nn import functional as F
 
 from langflash_core.rig.neighbours import witnesses
 from langflash_core.rig.rig import Rig
-
-TOLERANCE = 0.12
-"""What is this much nearer (relative depth) than the surface another photo sees is in its way:
-beyond the depth error of the shipped network, so that double surfaces of good depth merge instead."""
-
-_VOTES = 2
-"""Photos that see through something, one of which may be wrong."""
-_SKIRT = 0.05  # relative depth beyond all of the other's around a place, from which it is another surface
-_AROUND, _JUMP = 5, 0.1  # pixels of a window, and log depth within it from which depth jumps there
+from langflash_core.surface.settings import CONSISTENCY
 
 
 def seen_through(
-    rig: Rig, points: Float[Tensor, "V HW 3"] | None = None, tolerance: float = TOLERANCE
+    rig: Rig, points: Float[Tensor, "V HW 3"] | None = None, tolerance: float = CONSISTENCY.tolerance
 ) -> Bool[Tensor, "V H W"]:
     """(V, H, W) bool: what stands in free space of a photo which knows its depth better.
 
@@ -61,11 +53,12 @@ def outvoted(rig: Rig) -> Bool[Tensor, "V H W"]:
         own = rig.points(view)
         for other in witnesses(rig, view, own):
             there = rig.project(own, other)
-            before = there.z < (1 - _SKIRT) * there.looked_up(nearest[other])
-            behind = there.z > (1 + _SKIRT) * there.looked_up(farthest[other])
+            before = there.z < (1 - CONSISTENCY.skirt) * there.looked_up(nearest[other])
+            behind = there.z > (1 + CONSISTENCY.skirt) * there.looked_up(farthest[other])
             through[view] += there.inside & before
             same[view] += there.inside & ~before & ~behind
-    seen = ((through >= _VOTES) & (through > same)).view_as(depths)
+    seen = ((through >= CONSISTENCY.votes) & (through > same)).view_as(depths)
     logs = rig.log_depths[:, None]
-    steps = F.max_pool2d(logs, _AROUND, 1, _AROUND // 2) + F.max_pool2d(-logs, _AROUND, 1, _AROUND // 2)
-    return seen & (steps[:, 0] > _JUMP)
+    side = CONSISTENCY.around
+    steps = F.max_pool2d(logs, side, 1, side // 2) + F.max_pool2d(-logs, side, 1, side // 2)
+    return seen & (steps[:, 0] > CONSISTENCY.jump)

@@ -40,22 +40,15 @@ from langflash_core.surface.elements import (
     placed,
     under,
 )
+from langflash_core.surface.settings import LAYERS
 from langflash_core.surface.upsampling import Upsampled, upsampled
 from langflash_core.types import Camera, Cost, Gaussians, Prediction, Record, Scene, Views
-
-_HELD = 8
-"""Photos, what all of which see is held; each takes ten megabytes and a fiftieth of a second."""
-GROUND = 4  # pixels, side of the squares under what was parted
-MOST_ENLARGED = 3
-"""Times the grid, the size up to which a photo is looked at."""
-MOST_OF_LAYERS = 2_500_000
-"""Gaussians of all layers together: 160 MB in a file."""
 
 
 def working_size(photo: tuple[int, int], grid: tuple[int, int]) -> tuple[int, int]:
     """(height, width) at which a photo of that (height, width) is used: its own, within one and three times
     the grid's."""
-    high = [min(max(p, g), MOST_ENLARGED * g) for p, g in zip(photo, grid, strict=True)]
+    high = [min(max(p, g), LAYERS.most_enlarged * g) for p, g in zip(photo, grid, strict=True)]
     return high[0], high[1]
 
 
@@ -105,7 +98,7 @@ def assemble_detailed(
         raise ValueError("viewmats: expected finite poses, received others")
     known, keep, unit = _kept(prediction, views, transients)
     sights = _Sights(lambda v: _Sight.of(photos[v], views.images[v], known[v].log(), keep[v]), len(photos))
-    budget = gaussians or min(round(detail.most * int(keep.sum())), MOST_OF_LAYERS)
+    budget = gaussians or min(round(detail.most * int(keep.sum())), LAYERS.most_gaussians)
     covers, limit = _covers(sights, detail, budget, 0.0 if gaussians else detail.gain, progress)
     made, weights, parts = _made(prediction, views, _told(sights, progress, 0.5), covers, limit, top_m)
     size = sights[0].size
@@ -168,7 +161,7 @@ class _Sight:
 
 
 class _Sights(Sequence[_Sight]):
-    """What each photo sees; of more than `_HELD` made anew whenever it is asked for."""
+    """What each photo sees; of more than `LAYERS.held` made anew whenever it is asked for."""
 
     def __init__(self, make: Callable[[int], _Sight], count: int):
         self._make, self._count = make, count
@@ -185,7 +178,7 @@ class _Sights(Sequence[_Sight]):
         if isinstance(index, slice):
             return [self[v] for v in range(*index.indices(self._count))]
         if index not in self._known:
-            if self._count > _HELD:
+            if self._count > LAYERS.held:
                 self._known.clear()
             self._known[index] = self._make(index)
         return self._known[index]
@@ -252,7 +245,7 @@ def _made(
         ids, values = sparse_weights(refined.at(part.pixels // width, part.pixels % width), top_m)
         weights.append((ids.short(), values))  # of many photos: a quarter of the memory
         parts.append(part)
-        if len(covers) > _HELD:
+        if len(covers) > LAYERS.held:
             give_back()
     names = ("means", "quats", "scales", "opacities", "sh")
     whole = Gaussians(*(torch.cat([getattr(some, name) for some in made]) for name in names))
@@ -274,7 +267,9 @@ def _confidences(prediction: Prediction, parts: list[Elements]) -> Tensor:
 def _spent(elements: Elements, detail: Detail, budget: int, size: tuple[int, int]) -> dict:
     """What the record says of it."""
     coarse = int((elements.levels == COARSE).sum())
-    squares = elements.sides[~elements.hidden | (elements.sides <= GROUND)]  # not what goes on under others
+    squares = elements.sides[
+        ~elements.hidden | (elements.sides <= LAYERS.ground)
+    ]  # not what goes on under others
     sides = {str(2**level): int((squares == 2**level).sum()) for level in range(LEVELS + 1)}
     return {
         "level": detail.name,

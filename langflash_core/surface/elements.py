@@ -21,26 +21,15 @@ from torch import Tensor
 
 from langflash_core.geometry.cameras import invert_rigid, unproject
 from langflash_core.geometry.harmonics import colour_to_sh
-from langflash_core.geometry.jumps import towards_nearer
+from langflash_core.geometry.pinhole import from_pixels
 from langflash_core.geometry.quaternions import matrices_to_quats
-from langflash_core.geometry.surfels import ellipses, spans
+from langflash_core.geometry.surfels import ellipses, spans, towards_nearer
 from langflash_core.surface.blocks import Squares, padded
-from langflash_core.surface.upsampling import JUMP, Upsampled
+from langflash_core.surface.settings import COVERING, UPSAMPLING
+from langflash_core.surface.upsampling import Upsampled
 from langflash_core.types import Camera, Gaussians
 
-OPACITY = 0.99
 COARSE, FINE = 0, 1
-_FLAT_COVER, _FINE_COVER, _GROUND_COVER = 0.85, 0.5, 0.72
-"""Standard deviations in sides of a square: of coarse elements, of fine ones, of the ground under those."""
-_UNIFORM = 12**-0.5  # standard deviation of a square of side 1
-_NARROWEST = 0.6  # pixels, deviation of what is drawn in
-_THIN = 0.1  # thickness over a side
-_BEHIND = 0.004  # log depth by which the ground lies behind,
-_REACH = 8.0  # and by the slope of so many pixels more: no part of it may come before what lies on it
-_FARTHEST_BEHIND = 0.06
-_COARSE_BEHIND = 0.35  # of that, by which other coarse elements lie behind the fine ones beside them
-_UNDER = 7.0  # cells by which a surface goes on under a nearer one (`network/occlusion.py` has why)
-_STEP = 0.2  # log depth from a cell to the next that opens a gap
 
 
 @dataclass(frozen=True)
@@ -80,7 +69,7 @@ def of_squares(squares: Squares, photo: Float[Tensor, "3 h w"], depth: Upsampled
     right, bottom = (left + side).clamp(max=width), (top + side).clamp(max=height)
     x, y = (left + right) / 2, (top + bottom) / 2
     column, row = x.long().clamp(max=width - 1), y.long().clamp(max=height - 1)
-    cover = side * (_FINE_COVER if side < 4 else _FLAT_COVER)
+    cover = side * (COVERING.fine_cover if side < 4 else COVERING.flat_cover)
     root = torch.full_like(x, cover)
     return Elements(
         x, y, torch.stack((root, torch.zeros_like(root), root), -1),
@@ -96,7 +85,7 @@ def _middle_depths(log_depths: Tensor, x: Tensor, y: Tensor) -> Tensor:
     rows, columns = ([(along - back).long() for back in (0.5, 0.0)] for along in (y, x))
     four = torch.stack([log_depths[row, column] for row in rows for column in columns])
     mean = -(-four).exp().mean(0).log()
-    return torch.where(four.amax(0) - four.amin(0) > JUMP, four[-1], mean)
+    return torch.where(four.amax(0) - four.amin(0) > UPSAMPLING.jump, four[-1], mean)
 
 
 def _means(photo: Tensor, left: Tensor, top: Tensor, side: int) -> Tensor:
@@ -114,7 +103,7 @@ def ground(squares: Squares, photo: Float[Tensor, "3 h w"], depth: Upsampled) ->
     depths = depth.log_depths[rows, columns].flatten(1)  # (n, 16)
     pixels, colours = (rows * width + columns).flatten(1), photo[:, rows, columns].flatten(2)
     low, high = depths.amin(1, keepdim=True), depths.amax(1, keepdim=True)
-    near = (depths <= (low + high) / 2) | (high - low <= JUMP)
+    near = (depths <= (low + high) / 2) | (high - low <= UPSAMPLING.jump)
     corner = torch.stack((squares.left, squares.top), -1)
     parts = (near & inside, ~near & inside)
     return joined([_ground_of(part, depths, pixels, colours, corner, depth.cells) for part in parts])
@@ -135,14 +124,16 @@ def _ground_of(
     mean = share @ places
     off = places - mean[:, None]
     xx, xy, yy = ((share * off[..., i] * off[..., j]).sum(1) for i, j in ((0, 0), (0, 1), (1, 1)))
-    l11 = (xx + _UNIFORM**2).sqrt()
+    l11 = (xx + COVERING.uniform**2).sqrt()
     l21 = xy / l11
-    roots = torch.stack((l11, l21, (yy + _UNIFORM**2 - l21**2).clamp_min(_UNIFORM**2).sqrt()), -1)
+    roots = torch.stack(
+        (l11, l21, (yy + COVERING.uniform**2 - l21**2).clamp_min(COVERING.uniform**2).sqrt()), -1
+    )
     nearest = (off.square().sum(-1) + torch.where(part[some], 0.0, torch.inf)).argmin(1, keepdim=True)
     pixel = pixels[some].gather(1, nearest)[:, 0]
     x, y = (corner[some] + mean).unbind(-1)
     return Elements(
-        x, y, roots * (_GROUND_COVER / _UNIFORM), (share * depths[some]).sum(1),
+        x, y, roots * (COVERING.ground_cover / COVERING.uniform), (share * depths[some]).sum(1),
         cells.flatten()[pixel], pixel, (colours[:, some] * share).sum(-1).T,
         torch.full((len(x),), COARSE, dtype=torch.uint8), torch.full_like(x, side),
         torch.ones(len(x), dtype=torch.bool),
@@ -154,7 +145,7 @@ def drawn_in(elements: Elements, clear: Float[Tensor, "h w"]) -> Elements:
     along rows and columns stay on it, of what is wider than a pixel."""
     l11, l21, l22 = elements.roots.unbind(-1)
     widest = torch.maximum(l11, torch.hypot(l21, l22))
-    room = (clear.flatten()[elements.pixels] / 2).clamp_min(_NARROWEST)
+    room = (clear.flatten()[elements.pixels] / 2).clamp_min(COVERING.narrowest)
     return replace(elements, roots=elements.roots * (room / widest).clamp(max=1)[:, None])
 
 
@@ -164,13 +155,13 @@ def under(log_depths: Float[Tensor, "h w"], image: Float[Tensor, "3 H W"], size:
     Args:
         image: (3, H, W). size: (h, w) of the photo.
     """
-    signs = towards_nearer(log_depths, _STEP)
+    signs = towards_nearer(log_depths, COVERING.step)
     row, column = (signs.abs().sum(-1) > 0).nonzero(as_tuple=True)
     towards = signs[row, column] / signs[row, column].norm(dim=-1, keepdim=True)
     cell = torch.tensor([size[1] / log_depths.shape[1], size[0] / log_depths.shape[0]])
     middle = torch.stack((column, row), -1) + 0.5
-    x, y = ((middle + _UNDER / 2 * towards) * cell).unbind(-1)
-    wide = torch.full_like(x, _UNDER / 2) * cell[0]
+    x, y = ((middle + COVERING.under / 2 * towards) * cell).unbind(-1)
+    wide = torch.full_like(x, COVERING.under / 2) * cell[0]
     pixel_x, pixel_y = (middle * cell).long().unbind(-1)
     return Elements(
         x, y, torch.stack((wide, torch.zeros_like(x), wide), -1), log_depths[row, column],
@@ -194,23 +185,25 @@ def placed(
     K, ratio = camera.resized(size[1], size[0]).K, log_depths.shape[1] / size[1]
     span_u, span_v = _spans(log_depths, camera, size)
     cells = elements.cells
-    behind = (_BEHIND + _REACH * ratio * slopes.flatten()[cells]).clamp(max=_FARTHEST_BEHIND)
-    behind = torch.where(elements.hidden, behind, _COARSE_BEHIND * behind)
+    behind = (COVERING.behind + COVERING.reach * ratio * slopes.flatten()[cells]).clamp(
+        max=COVERING.farthest_behind
+    )
+    behind = torch.where(elements.hidden, behind, COVERING.coarse_behind * behind)
     logs = elements.log_depths + torch.where(elements.levels == COARSE, behind, 0.0)
     depths = logs.exp()
     scale = (depths / log_depths.flatten()[cells].exp())[:, None]
     span_u, span_v = span_u[cells] * scale, span_v[cells] * scale
     l11, l21, l22 = elements.roots[..., None].unbind(1)
     axes, deviations = ellipses(span_u * l11 + span_v * l21, span_v * l22)
-    thin = _THIN * elements.sides[:, None] * depths[:, None] / K[0, 0]
-    ray_x, ray_y = (elements.x - K[0, 2]) / K[0, 0], (elements.y - K[1, 2]) / K[1, 1]
-    pos_c = torch.stack((ray_x, ray_y, torch.ones_like(ray_x)), -1) * depths[:, None]
+    thin = COVERING.thin * elements.sides[:, None] * depths[:, None] / K[0, 0]
+    across = from_pixels(torch.stack((elements.x, elements.y), -1), K)
+    pos_c = torch.cat((across, torch.ones_like(depths)[:, None]), -1) * depths[:, None]
     pose = invert_rigid(camera.viewmat)
     return Gaussians(
         means=pos_c @ pose[:3, :3].T + pose[:3, 3],
         quats=matrices_to_quats(pose[:3, :3] @ axes),
         scales=torch.cat((torch.maximum(deviations, thin), thin), -1),
-        opacities=torch.full_like(depths, OPACITY),
+        opacities=torch.full_like(depths, COVERING.opacity),
         sh=colour_to_sh(elements.colours)[:, None],
     )
 

@@ -17,11 +17,11 @@ Minimised, each channel for itself, is
 
     sum w (r / sigma)^2 / (1 + (r / sigma)^2) + sum_i (s_i / tau_s)^2 + (o_i / tau_o)^2,
 
-the robust sum of Geman and McClure over all pairs, w = 1 / `TOGETHER`, and a prior that outweighs the pairs
-where they are few, or so even that gain and offset cannot be told apart. Gauge: in every set of photos that
-pairs connect, the mean of s and that of o are 0; a photo that shares nothing is a set of its own and stays
-exactly as it is. So do photos that no light makes alike: their poses or depths are wrong, and after a first
-minimum those pairs of photos are left out.
+the robust sum of Geman and McClure over all pairs, w = 1 / `EXPOSURE.together`, and a prior that outweighs
+the pairs where they are few, or so even that gain and offset cannot be told apart. Gauge: in every set of
+photos that pairs connect, the mean of s and that of o are 0; a photo that shares nothing is a set of its own
+and stays exactly as it is. So do photos that no light makes alike: their poses or depths are wrong, and after
+a first minimum those pairs of photos are left out.
 
 Sizes: V photos, H W pixels, P blocks of a photo, E ordered pairs of photos that are compared.
 
@@ -32,31 +32,19 @@ Geman and McClure 1985, sigma lowered step by step as in Black and Rangarajan 19
 import math
 from dataclasses import dataclass
 
+import numpy as np
 import torch
 from jaxtyping import Bool, Float, Int
 from torch import Tensor
 from torch.nn import functional as F
 
 from langflash_core.geometry.cameras import invert_rigid, transform, unproject
+from langflash_core.rig.pairs import strongest
 from langflash_core.rig.rig import Rig
+from langflash_core.surface.settings import EXPOSURE
 
-GAIN_RANGE = (0.4, 2.5)
-"""In sRGB values; almost three stops of exposure each way. What is farther off is drawn back into it."""
-LARGEST_OFFSET = 0.25
-BLOCK = 4  # pixels a side
-EXPOSED = (0.03, 0.97)  # sRGB values that the sensor and the curve still tell apart
-AGREES = 0.05  # relative difference of depths that show one surface
-CONFIDENT = 1 / 3  # an expected error of a fifth of the depth and less
-SOURCES = 5  # photos that each is compared with
-SIGMA = 0.05  # difference from which a pair speaks less and less
+BLOCK, SIGMA = EXPOSURE.block, EXPOSURE.sigma
 _SIGMAS = (0.4, 0.4, 0.2, 0.2, 0.1, 0.1) + 10 * (SIGMA,)  # step after step
-ALIKE = 0.5
-"""Share of the pairs of two photos that one light has to bring together. In a real office it was .75 and more
-with true poses and depths, .35 and less with overlaps that the network had found and that were none."""
-LOG_GAIN, OFFSET = 0.3, 0.05  # tau: what photos of one room are expected to differ by
-TOGETHER = 32.0  # pairs beside each other err together: so many count as one
-_AT_ONCE = 16  # pairs of photos, so that what is multiplied stays near the processor
-_COARSE = 4  # every so many blocks of a row and of a column tell which photos overlap
 
 
 @dataclass(frozen=True)
@@ -143,8 +131,8 @@ def compensate_exposure(rig: Rig) -> ExposureCompensation:
             what is not finite.
 
     Returns:
-        float64, on the CPU. Gains in `GAIN_RANGE`, offsets up to `LARGEST_OFFSET`. Exactly the identity for a
-        photo that shares nothing with others.
+        float64, on the CPU. Gains in `EXPOSURE.gain_range`, offsets up to `EXPOSURE.largest_offset`. Exactly
+        the identity for a photo that shares nothing with others.
     """
     with torch.no_grad():
         return solve_compensation(compared(rig.map(lambda values: values.detach().cpu().float())), len(rig))
@@ -160,10 +148,10 @@ def compared(rig: Rig) -> Pairs:
     for view in range(num_views):
         _, agrees = _carried(blocks, blocks.points[:, blocks.coarse], rig, view)
         shared[:, view] = (agrees & _confident(blocks.own[..., blocks.coarse])).sum(-1)
-    firsts, seconds = source_pairs(shared)
-    parts = []
-    for view in seconds.unique().tolist():
-        chosen = firsts[seconds == view]
+    both, parts = (shared + shared.T).numpy(), []
+    pairs = strongest(np.where(both > 0, both, -np.inf), EXPOSURE.sources)
+    for view in sorted({view for pair in pairs for view in pair}):
+        chosen = torch.tensor([sum(pair) - view for pair in pairs if view in pair])
         there, agrees = _carried(blocks, blocks.points[chosen], rig, view)
         own = blocks.own[chosen]
         exposed = (own[:, 3:6] > 0.999) & (there[:, 3:6] > 0.999)
@@ -180,15 +168,15 @@ def _no_pairs() -> Pairs:
 
 def _blocks(rig: Rig) -> _Blocks:
     assert rig.photos is not None and rig.confidences is not None, "whoever compares photos has them"
-    exposed = ((rig.photos > EXPOSED[0]) & (rig.photos < EXPOSED[1])).float()
+    exposed = ((rig.photos > EXPOSURE.exposed[0]) & (rig.photos < EXPOSURE.exposed[1])).float()
     full = torch.cat((rig.photos, exposed, rig.depths[:, None], rig.confidences[:, None]), 1)
     maps = F.avg_pool2d(full, BLOCK, stride=1)
     every = maps[..., ::BLOCK, ::BLOCK]
     lines, columns = every.shape[-2:]
-    scale = torch.tensor([BLOCK, BLOCK, 1.0])[:, None]
+    scale, step = torch.tensor([BLOCK, BLOCK, 1.0])[:, None], EXPOSURE.coarse
     points = transform(invert_rigid(rig.viewmats), unproject(every[:, 6], rig.Ks / scale).flatten(1, 2))
     coarse = torch.arange(lines * columns).view(lines, columns)
-    coarse = coarse[min(_COARSE // 2, lines - 1) :: _COARSE, min(_COARSE // 2, columns - 1) :: _COARSE]
+    coarse = coarse[*(slice(min(step // 2, side - 1), None, step) for side in (lines, columns))]
     return _Blocks(maps, every.flatten(2), points, coarse.flatten())
 
 
@@ -201,33 +189,13 @@ def _carried(blocks: _Blocks, points: Tensor, rig: Rig, view: int) -> tuple[Tens
     inside = seen.inside & (places.abs() <= 1).all(-1)
     places = torch.where(inside[:, None], places, 0.0)
     there = F.grid_sample(blocks.maps[view, None], places[None, None], align_corners=True)[0, :, 0]
-    agrees = inside & ((there[6] - seen.z).abs() < AGREES * seen.z) & (there[7] > CONFIDENT)
+    agrees = inside & ((there[6] - seen.z).abs() < EXPOSURE.agrees * seen.z) & (there[7] > EXPOSURE.confident)
     return there.unflatten(1, points.shape[:2]).transpose(0, 1), agrees.view(points.shape[:2])
 
 
 def _confident(own: Tensor) -> Tensor:
     """Blocks (V, P) of maps (V, 8, P) that may speak."""
-    return own[:, 7] > CONFIDENT
-
-
-def source_pairs(shared: Int[Tensor, "V V"]) -> tuple[Int[Tensor, " E"], Int[Tensor, " E"]]:
-    """Ordered pairs of photos to compare: each with the `SOURCES` that it shares most with, and what else it
-    takes to connect what shares anything.
-
-    Args:
-        shared: how much of a row's photo a column's photo sees.
-    """
-    both = (shared + shared.T).tolist()
-    part, degrees = list(range(len(both))), [0] * len(both)
-    edges = [(i, j) for j in range(len(both)) for i in range(j) if both[i][j]]
-    chosen = []
-    for i, j in sorted(edges, key=lambda edge: (-both[edge[0]][edge[1]], edge)):
-        if min(degrees[i], degrees[j]) < SOURCES or part[i] != part[j]:
-            chosen += [(i, j), (j, i)]
-            degrees[i], degrees[j] = degrees[i] + 1, degrees[j] + 1
-            part = [part[i] if own == part[j] else own for own in part]
-    firsts, seconds = torch.tensor(chosen, dtype=torch.int64).view(-1, 2).unbind(1)
-    return firsts, seconds
+    return own[:, 7] > EXPOSURE.confident
 
 
 def solve_compensation(pairs: Pairs, num_views: int) -> ExposureCompensation:
@@ -248,7 +216,7 @@ def _alike(pairs: Pairs, light: ExposureCompensation) -> Tensor:
     )
     scale = (light.gains[pairs.firsts] * light.gains[pairs.seconds]).sqrt()[..., None]
     near = pairs.counted & ((first - second).abs() < 2 * SIGMA * scale)
-    return near.sum((1, 2)) >= ALIKE * pairs.counted.sum((1, 2))
+    return near.sum((1, 2)) >= EXPOSURE.alike * pairs.counted.sum((1, 2))
 
 
 def _minimum(pairs: Pairs, num_views: int) -> ExposureCompensation:
@@ -256,7 +224,7 @@ def _minimum(pairs: Pairs, num_views: int) -> ExposureCompensation:
     connected = _connected(pairs, num_views)
     gauge = torch.eye(num_views, dtype=torch.float64) - connected / connected.sum(-1, keepdim=True)
     gauge = torch.kron(gauge, torch.eye(2, dtype=torch.float64))  # (3, 2V, 2V)
-    prior = torch.tensor([LOG_GAIN**-2, OFFSET**-2], dtype=torch.float64).repeat(num_views)
+    prior = torch.tensor([EXPOSURE.log_gain**-2, EXPOSURE.offset**-2], dtype=torch.float64).repeat(num_views)
     found = torch.zeros(3, 2 * num_views, dtype=torch.float64)  # s and o of a photo after the other
     for sigma in _SIGMAS if len(pairs.firsts) else ():
         normal, right = _normal_equations(pairs, found.view(3, num_views, 2), sigma)
@@ -279,7 +247,7 @@ def _normal_equations(pairs: Pairs, found: Tensor, sigma: float) -> tuple[Tensor
     logs, offsets = found.transpose(0, 1).unbind(-1)  # (V, 3)
     scale = (-(logs[a] + logs[b]) / 2).exp()  # (E, 3)
     lights = [(logs[of].exp() * scale, offsets[of] * scale) for of in (a, b)]
-    some = torch.arange(len(a)).split(_AT_ONCE)
+    some = torch.arange(len(a)).split(EXPOSURE.at_once)
     sums = torch.cat([_sums(pairs, lights, edges, sigma) for edges in some])  # (E, 3, 6)
     slopes = torch.cat([_slopes(offsets[a], scale), -_slopes(offsets[b], scale)], -1)  # (E, 3, 2, 4)
     blocks = slopes.mT @ sums[..., :4].unflatten(-1, (2, 2)) @ slopes  # (E, 3, 4, 4)
@@ -299,7 +267,7 @@ def _sums(pairs: Pairs, lights: list[tuple[Tensor, Tensor]], edges: Tensor, sigm
         for (gains, offsets), colours in zip(lights, (pairs.own, pairs.other), strict=True)
     )
     gap, middle = first - second, (first + second) / 2
-    weights = pairs.counted[edges] / ((1 + (gap / sigma) ** 2) ** 2 * (sigma**2 * TOGETHER))
+    weights = pairs.counted[edges] / ((1 + (gap / sigma) ** 2) ** 2 * (sigma**2 * EXPOSURE.together))
     weighted = weights * middle
     products = (weighted * middle, weighted, weighted, weights, weighted * gap, weights * gap)
     return torch.stack([values.sum(-1) for values in products], -1)
@@ -325,6 +293,6 @@ def _connected(pairs: Pairs, num_views: int) -> Tensor:
 def _bounded(found: Tensor, connected: Tensor) -> Tensor:
     """s and o (3, V, 2), where one leaves its range drawn to 0 together with all that are connected to it:
     their means stay 0."""
-    limits = torch.tensor([math.log(GAIN_RANGE[1]), LARGEST_OFFSET], dtype=torch.float64)
+    limits = torch.tensor([math.log(EXPOSURE.gain_range[1]), EXPOSURE.largest_offset], dtype=torch.float64)
     excess = (found.abs() / limits).amax(-1)  # (3, V)
     return found / (connected * excess[:, None]).amax(-1).clamp_min(1)[..., None]

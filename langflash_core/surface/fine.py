@@ -24,23 +24,17 @@ from langflash_core.images.views import source_picture, source_size
 from langflash_core.rig.rig import Rig
 from langflash_core.scene.report import left_out_line
 from langflash_core.surface.assemble import placed_views, rig_of
-from langflash_core.surface.colours import ROUNDS, solved_colours
+from langflash_core.surface.colours import solved_colours
 from langflash_core.surface.detailed import assemble_detailed, working_photo, working_size
 from langflash_core.surface.exposure_compensation import ExposureCompensation, compensate_exposure
 from langflash_core.surface.foreseen import foresight
 from langflash_core.surface.prune import prune
+from langflash_core.surface.settings import COLOURS, LAYERS
 from langflash_core.surface.transients import transient_masks
 from langflash_core.types import Cost, Prediction, Scene, Views
 
-_HELD = 8  # photos that stay decoded
 _LEFT_OUT = "{} disagrees with the other photos and was left out"
 _LEFT_OUT_OF_SOME = "{} disagree with the other photos and were left out"
-
-
-MOST_LAYERS = 62
-"""Photos that keep one, unless it is said how many Gaussians there may be: the 2.5 million of a scene leave
-40,000 for each, with which two real photos keep .78 and .82 of their structure (80,000: .86 and .90, 12,000:
-.50 and .55)."""
 
 
 @dataclass(frozen=True)
@@ -118,8 +112,8 @@ def coloured_scene(covered: Covered, progress: Progress = lambda stage, fraction
 
 
 class _Photos(Sequence[Tensor]):
-    """Photos (3, h, w) at their working size, in the light of all; of more than `_HELD` each is decoded anew
-    whenever it is asked for."""
+    """Photos (3, h, w) at their working size, in the light of all; of more than `LAYERS.held` each is decoded
+    anew whenever it is asked for."""
 
     def __init__(self, views: Views, light: ExposureCompensation, grid: tuple[int, int]):
         self._views, self._light, self._grid = views, light, grid
@@ -141,7 +135,7 @@ class _Photos(Sequence[Tensor]):
             return self._known[index]
         photo = working_photo(source_picture(self._views, index), self._grid)
         photo = self._light.corrected(photo, view=index).clamp(0, 1)
-        if len(self) <= _HELD:
+        if len(self) <= LAYERS.held:
             self._known[index] = photo
         return photo
 
@@ -199,13 +193,13 @@ def _told(left_out: dict[str, list[float]], names: tuple[str, ...]) -> list[str]
 
 
 def _with_layers(prediction: Prediction) -> Bool[Tensor, " V"]:
-    """Which photos keep a layer: all, or `MOST_LAYERS` that lie all over the walk."""
+    """Which photos keep a layer: all, or `LAYERS.most` that lie all over the walk."""
     poses = prediction.viewmats.cpu().double()
     depths = prediction.depths[0]
     usable = depths[torch.isfinite(depths) & (depths > 0)]
     distance = float(usable.median()) if len(usable) else 1.0
     centres, axes = invert_rigid(poses)[:, :3, 3].numpy(), poses[:, 2, :3].numpy()
-    kept = Nearness(centres, axes, distance, tuple(range(len(poses)))).spread(MOST_LAYERS)
+    kept = Nearness(centres, axes, distance, tuple(range(len(poses)))).spread(LAYERS.most)
     return torch.zeros(len(poses), dtype=torch.bool).index_fill(0, torch.tensor(kept), True)
 
 
@@ -242,5 +236,9 @@ def _coloured(
 
     colours, near = zip(*at_once(solved, turns()), strict=True)
     sh = colour_to_sh(low + (high - low) * torch.cat(colours))[:, None]
-    bought = {**scene.record.detail, "rounds": ROUNDS, "photos_psnr_db": [round(db, 2) for db in near]}
+    bought = {
+        **scene.record.detail,
+        "rounds": COLOURS.rounds,
+        "photos_psnr_db": [round(db, 2) for db in near],
+    }
     return replace(scene, gaussians=replace(scene.gaussians, sh=sh)).with_record(detail=bought)

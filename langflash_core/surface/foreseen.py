@@ -17,17 +17,15 @@ from jaxtyping import Bool, Float
 from torch import Tensor
 from torch.nn import functional as F
 
-from langflash_core.geometry.cameras import invert_rigid
-from langflash_core.geometry.nearness import Chosen, Nearness
+from langflash_core.geometry.nearness import Chosen
+from langflash_core.rig.neighbours import beside
 from langflash_core.rig.projected import project_points
 from langflash_core.rig.rig import Rig
 from langflash_core.splat.compose import shares
+from langflash_core.surface.settings import FORESEEING
 from langflash_core.types import Camera
 
-CELL = 3
-"""Pixels a side: a neighbour up to three times as far away still leaves a point in each."""
-_FRONT = 0.1  # of the depth behind the nearest point of a cell, within which others are its surface, too
-_GREY = (0.299, 0.587, 0.114)
+CELL = FORESEEING.cell
 
 
 @dataclass(frozen=True)
@@ -58,7 +56,7 @@ def foresight(rig: Rig) -> Foresight:
     found, (height, width) = [], rig.size
     for view, image in enumerate(rig.photos):
         camera = Camera(rig.viewmats[view], rig.Ks[view], width, height)
-        chosen = _beside(rig, view, camera)
+        chosen = beside(rig, view)
         pictures = [
             draw_points(rig.points(other), rig.photos[other].flatten(1), camera) for other in chosen.views
         ]
@@ -66,14 +64,6 @@ def foresight(rig: Rig) -> Foresight:
         alike = _alike(picture, F.avg_pool2d(image, CELL), shown)
         found.append((float(shown.float().mean()), alike, chosen.views[0]))
     return Foresight(*(tuple(column) for column in zip(*found, strict=True)))
-
-
-def _beside(rig: Rig, view: int, camera: Camera) -> Chosen:
-    """The other photos that a picture at a photo's place would be drawn from."""
-    poses = invert_rigid(rig.viewmats.double()).cpu().numpy()
-    others = [other for other in range(len(rig)) if other != view]
-    distance = float(rig.depths[view].nanmedian())
-    return Nearness(poses[others, :3, 3], poses[others, :3, 2], distance, tuple(others)).chosen(camera)
 
 
 def _blended(
@@ -96,7 +86,7 @@ def draw_points(
     some = there.inside.nonzero()[:, 0]
     z, places = there.z[some], there.y[some].long() // CELL * width + there.x[some].long() // CELL
     nearest = z.new_full((height * width,), torch.inf).scatter_reduce(0, places, z, "amin")
-    front = z < (1 + _FRONT) * nearest[places]
+    front = z < (1 + FORESEEING.front) * nearest[places]
     some, places = some[front], places[front]
     sums = z.new_zeros(3, height * width).index_add_(1, places, colours[:, some])
     counts = torch.bincount(places, minlength=height * width).clamp_min(1)
@@ -108,7 +98,8 @@ def _alike(
 ) -> float | None:
     """Correlation of the differences of grey from cell to cell, across and down, where both are shown: light
     and contrast do not matter; None where one has none."""
-    greys = torch.einsum("c,pchw->phw", picture.new_tensor(_GREY), torch.stack((picture, photo))).double()
+    grey = picture.new_tensor(FORESEEING.grey)
+    greys = torch.einsum("c,pchw->phw", grey, torch.stack((picture, photo))).double()
     across = greys.diff(dim=2)[:, shown[:, 1:] & shown[:, :-1]]
     down = greys.diff(dim=1)[:, shown[1:] & shown[:-1]]
     ours, theirs = torch.cat((across, down), 1)

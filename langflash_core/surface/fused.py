@@ -25,12 +25,9 @@ from langflash_core.splat.mixing import mixing
 from langflash_core.splat.projection import project, view_depths
 from langflash_core.surface.colours import Solved, solved_colours
 from langflash_core.surface.consistency import outvoted, seen_through
+from langflash_core.surface.settings import COLOURS
 from langflash_core.surface.view_selection import fill_uncovered, select_views
 from langflash_core.types import Camera, Scene
-
-_SHOWN = 0.5  # alpha from which a cell shows the layer
-_SEEN = 0.05  # pixels that a Gaussian contributes to all pictures, below which its colour stays
-_STEP = 1 / 255  # colour: the least range in which colours are solved for
 
 
 def fused(scene: Scene) -> Scene:
@@ -49,7 +46,7 @@ def _colours(scene: Scene, whole: Scene) -> Float[Tensor, "n 3"]:
     if len(start) == 0:
         return start
     ends = sh_to_colour(scene.gaussians.sh, scene.gaussians.means).nan_to_num(0.5)
-    low, high = ends.amin(0), ends.amax(0).maximum(ends.amin(0) + _STEP)
+    low, high = ends.amin(0), ends.amax(0).maximum(ends.amin(0) + COLOURS.step)
     size = tuple(scene.record.detail.get("photo_size", scene.view_size))
 
     def solved(view: int) -> Solved:
@@ -62,14 +59,14 @@ def _colours(scene: Scene, whole: Scene) -> Float[Tensor, "n 3"]:
     for found in at_once(solved, scene.view_ids[scene.view_ids >= 0].unique().tolist()):
         sums += found.seen[:, None] * found.colours
         seen += found.seen[:, None]
-    mean = low + (high - low) * sums / seen.clamp_min(_SEEN)
-    return torch.where(seen > _SEEN, mean, start)
+    mean = low + (high - low) * sums / seen.clamp_min(COLOURS.seen)
+    return torch.where(seen > COLOURS.seen, mean, start)
 
 
 def _picture(layer: Scene, camera: Camera) -> Float[Tensor, "3 h w"]:
     """A layer from its photo's place; no number where it shows nothing."""
     colours, alpha = _drawn(layer, camera, sh_to_colour(layer.gaussians.sh, layer.gaussians.means))
-    return torch.where(alpha >= _SHOWN, colours, torch.nan)
+    return torch.where(alpha >= COLOURS.shown, colours, torch.nan)
 
 
 def _drawn(
@@ -78,7 +75,7 @@ def _drawn(
     """Means of values of a layer's Gaussians in each pixel, and alpha."""
     matrix = mixing(project(layer.gaussians, camera), camera, len(layer.gaussians))
     light, sums = np.asarray(matrix.sum(1))[:, 0], matrix @ values.nan_to_num(0).float().numpy()
-    means = torch.from_numpy(sums / np.maximum(light, _SHOWN)[:, None]).T
+    means = torch.from_numpy(sums / np.maximum(light, COLOURS.shown)[:, None]).T
     size = (camera.height, camera.width)
     return means.reshape(-1, *size), torch.from_numpy(light).reshape(size)
 
@@ -93,7 +90,7 @@ def fused_rows(scene: Scene) -> Bool[Tensor, " N"]:
         return rows
     depths, alphas = _own_depths(scene, views.tolist())
     rig = Rig(scene.viewmats[views].float(), scene.Ks[views].float(), depths, alphas)
-    keep = covering(rig, alphas >= _SHOWN)
+    keep = covering(rig, alphas >= COLOURS.shown)
     for number, view in enumerate(views.tolist()):
         own = (scene.view_ids == view).nonzero().squeeze(1)
         there = rig.project(scene.gaussians.means[own].float().T.contiguous(), number)
@@ -142,7 +139,7 @@ def _own_depths(scene: Scene, views: list[int]) -> tuple[Float[Tensor, "L H W"],
     def seen(view: int) -> tuple[Tensor, Tensor]:
         layer, camera = scene.layer(view), scene.camera(view)
         (depth,), alpha = _drawn(layer, camera, view_depths(layer.gaussians, camera)[:, None])
-        there = alpha >= _SHOWN
+        there = alpha >= COLOURS.shown
         return torch.where(there, depth, 1.0), torch.where(there, alpha, 0.0)
 
     depths, alphas = zip(*at_once(seen, views), strict=True)

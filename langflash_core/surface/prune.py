@@ -18,11 +18,8 @@ from langflash_core.geometry.harmonics import SH_C0
 from langflash_core.rig.projected import project_points
 from langflash_core.scene.fields import stored_bytes
 from langflash_core.scene.weights import renormalised
+from langflash_core.surface.settings import PRUNING
 from langflash_core.types import Gaussians, Scene, Semantics
-
-CUT = 1 / 255  # the smallest step of an 8-bit picture
-_MAX_OPACITY = 0.9999  # log(1 - o) stays finite
-_CHUNK = 65_536  # merged Gaussians whose dense weights are held at once
 
 
 @dataclass(frozen=True)
@@ -54,7 +51,7 @@ def prune(
     o1, o2 composite to opacity 1 - (1 - o1)(1 - o2).
     """
     start = time.perf_counter()
-    bright = scene.rows(scene.gaussians.opacities >= CUT)
+    bright = scene.rows(scene.gaussians.opacities >= PRUNING.cut)
     merged = bright
     if merge:
         merged = _merged(bright, _parents(_sight(bright), bright, merge_radius, colour_tolerance))
@@ -194,7 +191,7 @@ def _merged(scene: Scene, parents: Tensor) -> Scene:
     opacities = gaussians.opacities[members]
     shares = opacities / _group_sum(opacities, group, len(heads))[group]
     winners = members[_first_of_each(group, -opacities, len(heads))]
-    through = _group_sum(torch.log1p(-opacities.clamp_max(_MAX_OPACITY)), group, len(heads))
+    through = _group_sum(torch.log1p(-opacities.clamp_max(PRUNING.max_opacity)), group, len(heads))
 
     def blended(field: Tensor) -> Tensor:
         share = shares.view(-1, *(1,) * (field.ndim - 1))
@@ -226,8 +223,8 @@ def _blended_weights(members: Semantics, shares: Tensor, group: Tensor) -> tuple
     ids, values, num_atoms = members.weight_ids, members.weight_values * shares[:, None], members.num_atoms
     num_groups, top_m = int(group.max()) + 1, ids.shape[1]
     parts = []
-    for first in range(0, num_groups, _CHUNK):
-        count = min(_CHUNK, num_groups - first)
+    for first in range(0, num_groups, PRUNING.chunk):
+        count = min(PRUNING.chunk, num_groups - first)
         here = (group >= first) & (group < first + count)
         flat = (group[here, None] - first) * num_atoms + ids[here]
         dense = values.new_zeros(count * num_atoms).index_add(0, flat.flatten(), values[here].flatten())
@@ -239,7 +236,7 @@ def _blended_weights(members: Semantics, shares: Tensor, group: Tensor) -> tuple
 def sparser(scene: Scene) -> Scene:
     """Weights below 1/255 become 0, empty columns and unused atoms go, ids are renumbered."""
     semantics, ids, values = scene.semantics, scene.semantics.weight_ids, scene.semantics.weight_values
-    values = renormalised(torch.where(values >= CUT, values, 0.0))
+    values = renormalised(torch.where(values >= PRUNING.cut, values, 0.0))
     values, order = values.sort(dim=-1, descending=True, stable=True)
     ids = ids.gather(1, order)
     kept_columns = int((values > 0).any(0).sum())

@@ -32,25 +32,10 @@ from torch.nn import functional as F
 from langflash_core.rig.neighbours import neighbours
 from langflash_core.rig.projected import Projected, project_points
 from langflash_core.rig.rig import Rig
+from langflash_core.surface.settings import TRANSIENTS
 
-LEAST = 3
-"""Photos, from which on two may contradict one."""
-_CELL = 2  # pixels a side
-_AROUND = 3  # cells a side of the window in which colours may lie
-_OTHER = 0.1  # sRGB, beyond all colours around, from which it is another colour
-_ALIKE = 0.1  # sRGB and log depth, within which others foresee one thing
-_THROUGH = 0.12  # log depth by which a surface lies behind another
-_VOTES = 2
-_ASKED = 8  # photos that are asked about one
-_FEW = 3  # of them, of which one is enough to show what another denies
-_WINDOW, _FULL = 5, 0.6  # cells a side, and the share of them that is contradicted inside a region
-_SMALLEST = 0.004  # of a photo
-_FARTHEST = 24  # cells, by which a region may go on
-_MARGIN = 2  # cells beyond its border
-_NEAR, _LIKE = 3, 0.06  # pixels a side of the window, and sRGB, within which a pixel is found again
-_FOUND = 0.5  # of a region's pixels, at one depth
-_DENIES = 0.5  # of a region, that another photo must look at or through to deny it
-_IN_VIEW = 0.3  # of a region, that another photo must have before it to say anything
+_CELL, _WINDOW, _AROUND = TRANSIENTS.cell, TRANSIENTS.window, TRANSIENTS.around
+_VOTES, _THROUGH, _ALIKE = TRANSIENTS.votes, TRANSIENTS.through, TRANSIENTS.alike
 _SQUARE = np.ones((3, 3), bool)
 _DEPTHS = (*(k / 20 for k in range(-12, 13)), 0.8, 1.1, 1.6, 2.5)
 """Log depths, by which a region is moved: what is seen through a window or in a mirror is far."""
@@ -63,14 +48,14 @@ def transient_masks(rig: Rig) -> Bool[Tensor, "V H W"]:
         rig: with photos in one light, whose places are known; depths are finite.
 
     Returns:
-        Nothing of fewer than `LEAST` photos, and nothing of what fewer than two others foresee.
+        Nothing of fewer than `TRANSIENTS.least` photos, and nothing of what fewer than two others foresee.
     """
     found = torch.zeros_like(rig.depths, dtype=torch.bool)
-    if len(rig) < LEAST or min(rig.size) < _CELL * _WINDOW:
+    if len(rig) < TRANSIENTS.least or min(rig.size) < _CELL * _WINDOW:
         return found
     looks = [_Look.of(rig, view) for view in range(len(rig))]
     for view, own in enumerate(looks):
-        others = [looks[other] for other in neighbours(rig, view, "sight", _ASKED)]
+        others = [looks[other] for other in neighbours(rig, view, "sight", TRANSIENTS.asked)]
         if len(others) < _VOTES:
             continue
         said = _Foreseen.together([other.foreseen(own) for other in others])
@@ -153,17 +138,18 @@ class _Look:
         of them lie; NaN where it has them nowhere before it."""
         rays, colours = other.points[:, pixels] - other.centre, other.image.flatten(1)[:, pixels]
         least, most = (
-            sign * F.max_pool2d(sign * self.image, _NEAR, 1, _NEAR // 2).flatten(1) for sign in (-1, 1)
+            sign * F.max_pool2d(sign * self.image, TRANSIENTS.near, 1, TRANSIENTS.near // 2).flatten(1)
+            for sign in (-1, 1)
         )
         best = math.nan
         for change in _DEPTHS:
             rows, columns, there = self.before(other.centre + math.exp(change) * rays)
             inside = there.inside
-            if float(inside.float().mean()) < _IN_VIEW:
+            if float(inside.float().mean()) < TRANSIENTS.in_view:
                 continue
             places = (rows * self.image.shape[2] + columns)[inside]
             off = _beyond(colours[:, inside], least[:, places], most[:, places]).amax(0)
-            best = np.fmax(best, float((off < _LIKE).float().mean()))
+            best = np.fmax(best, float((off < TRANSIENTS.like).float().mean()))
         return float(best)
 
 
@@ -191,9 +177,9 @@ def _contradicted(own: _Look, said: _Foreseen, faced: Tensor) -> tuple[Tensor, T
     outside = torch.maximum(
         _beyond(said.colour, own.least, own.most).amax(1), _beyond(own.colour, said.least, said.most).amax(1)
     )  # (U, h, w)
-    other = told & (gap > -_THROUGH) & (outside > _OTHER)
+    other = told & (gap > -_THROUGH) & (outside > TRANSIENTS.other)
     one = other & _as_most(other, said)
-    votes, same = one.sum(0), (told & (outside <= _OTHER) & (gap.abs() < _THROUGH)).sum(0)
+    votes, same = one.sum(0), (told & (outside <= TRANSIENTS.other) & (gap.abs() < _THROUGH)).sum(0)
     through = (told & (gap > _THROUGH)).sum(0)
     return (votes >= _VOTES) & (votes >= 2 * same), (through >= _VOTES) & (through > 2 * same)
 
@@ -214,11 +200,11 @@ def _as_most(other: Tensor, said: _Foreseen) -> Tensor:
 
 def _seeds(contradicted: Tensor) -> list[Tensor]:
     """Regions (h, w) bool of what is contradicted as a whole."""
-    full = F.avg_pool2d(contradicted[None, None].float(), _WINDOW, 1, _WINDOW // 2)[0, 0] > _FULL
+    full = F.avg_pool2d(contradicted[None, None].float(), _WINDOW, 1, _WINDOW // 2)[0, 0] > TRANSIENTS.full
     inside = _wider(full, _WINDOW // 2) & contradicted
     count, numbers = cv2.connectedComponents(inside.cpu().numpy().astype(np.uint8))
     sizes = np.bincount(numbers.ravel(), minlength=count)
-    large = [k for k in range(1, count) if sizes[k] >= _SMALLEST * numbers.size]
+    large = [k for k in range(1, count) if sizes[k] >= TRANSIENTS.smallest * numbers.size]
     return [torch.from_numpy(numbers == k).to(contradicted.device) for k in large]
 
 
@@ -229,10 +215,10 @@ def _elsewhere(seed: Tensor, own: _Look, others: list[_Look], faced: Tensor) -> 
     asked = [
         other
         for other, cells in zip(others, faced, strict=True)
-        if float(cells[seed].float().mean()) > _DENIES
+        if float(cells[seed].float().mean()) > TRANSIENTS.denies
     ]
-    showing = sum(other.shows(own, pixels) >= _FOUND for other in asked)
-    return showing >= (_VOTES if len(asked) > _FEW else 1)
+    showing = sum(other.shows(own, pixels) >= TRANSIENTS.found for other in asked)
+    return showing >= (_VOTES if len(asked) > TRANSIENTS.few else 1)
 
 
 def _grown(seeds: Tensor, may: Tensor) -> Tensor:
@@ -240,12 +226,14 @@ def _grown(seeds: Tensor, may: Tensor) -> Tensor:
     import scipy.ndimage  # a tenth of what is imported for a scene, where few have transients
 
     grown = scipy.ndimage.binary_dilation(
-        seeds.cpu().numpy(), _SQUARE, _FARTHEST, (may | seeds).cpu().numpy()
+        seeds.cpu().numpy(), _SQUARE, TRANSIENTS.farthest, (may | seeds).cpu().numpy()
     )
     closed = scipy.ndimage.binary_closing(np.pad(grown, _WINDOW), _SQUARE, 2)[
         _WINDOW:-_WINDOW, _WINDOW:-_WINDOW
     ]
-    return _wider(torch.from_numpy(scipy.ndimage.binary_fill_holes(closed)).to(seeds.device), _MARGIN)
+    return _wider(
+        torch.from_numpy(scipy.ndimage.binary_fill_holes(closed)).to(seeds.device), TRANSIENTS.margin
+    )
 
 
 def _wider(mask: Tensor, cells: int) -> Tensor:

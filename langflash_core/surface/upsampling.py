@@ -17,15 +17,7 @@ from jaxtyping import Float, Int
 from torch import Tensor
 from torch.nn import functional as F
 
-JUMP = 0.04
-"""Log depth beyond what a plane has, from which neighbours are no longer one surface."""
-_COLOUR = 0.06  # standard deviation of a channel within one thing
-_REACH = 0.6  # cells, standard deviation of how far a colour's depth goes
-_STEEP = (
-    0.04  # log depth from a cell to the next: a floor has a quarter; more is the way from a thing to a wall
-)
-_FARTHEST = 0.1  # relative inverse depth by which a cell's slope may change it
-_STEEPEST = 0.2  # of it, from a cell to the next: a jump, since planes at more than 2 degrees are flatter
+from langflash_core.surface.settings import UPSAMPLING
 
 
 @dataclass(frozen=True)
@@ -49,7 +41,7 @@ def upsampled(
     height, width = photo.shape[-2:]
     inverse = (-log_depths).exp()
     steps = _shorter(inverse, 1), _shorter(inverse, 0)
-    across, down = (torch.where(step.abs() > _STEEPEST * inverse, 0.0, step) for step in steps)
+    across, down = (torch.where(step.abs() > UPSAMPLING.steepest * inverse, 0.0, step) for step in steps)
     rows = _cells_along(height, log_depths.shape[0])
     columns = _cells_along(width, log_depths.shape[1])
     cells = rows[:, None] * log_depths.shape[1] + columns
@@ -92,7 +84,7 @@ def _broken(log_depths: Tensor, slope: Tensor) -> Tensor:
     """(H, W) bool: the cell and its eight neighbours are more than one surface, or the way between two."""
     wide = F.pad(log_depths[None, None], (1,) * 4, mode="replicate")
     span = F.max_pool2d(wide, 3, 1) + F.max_pool2d(-wide, 3, 1)
-    return (span[0, 0] > JUMP + 3 * slope) | (slope > _STEEP)
+    return (span[0, 0] > UPSAMPLING.jump + 3 * slope) | (slope > UPSAMPLING.steep)
 
 
 def _chosen(
@@ -109,18 +101,18 @@ def _chosen(
     y = (pixels[0] + 0.5) * height / photo.shape[-2]
     x = (pixels[1] + 0.5) * width / photo.shape[-1]
     colours, grid = photo[:, pixels[0], pixels[1]], image.flatten(1)
-    steep = ((across.square() + down.square()) / (inverse * _STEEP).square()).flatten()
+    steep = ((across.square() + down.square()) / (inverse * UPSAMPLING.steep).square()).flatten()
     best, cells, values = torch.full_like(y, torch.inf), torch.zeros_like(own[0]), torch.zeros_like(y)
     for row in (own[0] - 1, own[0], own[0] + 1):
         for column in (own[1] - 1, own[1], own[1] + 1):
             at_row, at_column = row.clamp(0, height - 1), column.clamp(0, width - 1)
             cell = at_row * width + at_column
             to_y, to_x = y - at_row - 0.5, x - at_column - 0.5
-            differs = (grid[:, cell] - colours).square().sum(0) / (6 * _COLOUR**2)
-            cost = differs + (to_y**2 + to_x**2) / (2 * _REACH**2) + steep[cell]
+            differs = (grid[:, cell] - colours).square().sum(0) / (6 * UPSAMPLING.colour**2)
+            cost = differs + (to_y**2 + to_x**2) / (2 * UPSAMPLING.reach**2) + steep[cell]
             there = inverse.flatten()[cell]
             value = there + across.flatten()[cell] * to_x + down.flatten()[cell] * to_y
-            value = value.clamp(there * (1 - _FARTHEST), there * (1 + _FARTHEST))
+            value = value.clamp(there * (1 - UPSAMPLING.farthest), there * (1 + UPSAMPLING.farthest))
             better = cost < best
             best = torch.where(better, cost, best)
             cells, values = torch.where(better, cell, cells), torch.where(better, value, values)

@@ -25,14 +25,10 @@ from torch.nn import functional as F
 from langflash_core.geometry.surfels import spans
 from langflash_core.geometry.vantage import from_the_middle, leading
 from langflash_core.rig.rig import Rig
+from langflash_core.surface.settings import VIEW_SELECTION
 
-BEHIND, BEFORE = 0.12, 0.12
-"""Log depth: how far behind and before another photo's surface a pixel still shows the same one."""
-_ABOUT = 0.2  # relative depth by which what covers a cell may lie behind it
-_ALL = 8  # photos, up to which all are compared with all
-_TRIED = 8  # cells of a row and of a column, of which one is tried; and the side of a block
-_BORDER = 2  # cells, at the border of a photo that leads, that take nothing over
-_FINER = 2.0  # area that a pixel of the earlier photo covers over that of a later one which takes it over
+_TRIED, _BORDER = VIEW_SELECTION.tried, VIEW_SELECTION.border
+_FINER, _ALL = VIEW_SELECTION.finer, VIEW_SELECTION.all
 
 
 def select_views(rig: Rig, known: Bool[Tensor, "V H W"] | None = None) -> Bool[Tensor, "V H W"]:
@@ -94,7 +90,7 @@ def fill_uncovered(
     for view in from_the_middle(rig.depths, rig.viewmats):
         if not bool(bare[view].any()):
             continue
-        own = bare[view] & ~_hit(before, rig, view, (1 + _ABOUT) * rig.depths[view])
+        own = bare[view] & ~_hit(before, rig, view, (1 + VIEW_SELECTION.about) * rig.depths[view])
         found[view] |= own
         before = torch.cat((before, rig.points(view)[:, own.flatten()]), 1)
     return found
@@ -112,7 +108,7 @@ def find_covered(
     order = _block_by_block(*rig.size)
     points = [rig.points(view)[:, order[kept.flatten()[order]]] for view, kept in enumerate(keep)]
     everything, found = _Blocks.of(torch.cat(points, 1)), []
-    farthest = (1 + _ABOUT) * rig.depths
+    farthest = (1 + VIEW_SELECTION.about) * rig.depths
     if anything is not None:
         farthest = torch.where(anything, torch.inf, farthest)
     for view, limit in enumerate(farthest):
@@ -221,7 +217,8 @@ def _same(points: Tensor, rig: Rig, views: int | slice, known: Tensor) -> Tensor
     """
     there = rig.project(points, views)
     gap = there.z.clamp_min(1e-9).log() - there.looked_up(rig.log_depths[views].flatten(-2))
-    return there.inside & there.looked_up(known.flatten(-2)) & (gap < BEHIND) & (gap > -BEFORE)
+    near = (gap < VIEW_SELECTION.behind) & (gap > -VIEW_SELECTION.before)
+    return there.inside & there.looked_up(known.flatten(-2)) & near
 
 
 def _closed(keep: Tensor) -> Tensor:

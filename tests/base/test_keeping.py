@@ -16,8 +16,7 @@ from langflash_core.errors import Cancelled, OutputError
 from langflash_core.images.pictures import read_pictures
 from langflash_core.images.views import load_views
 from langflash_core.network import GuidedDepthNet
-from langflash_core.reconstruction.finding import keep_of
-from langflash_core.reconstruction.kept_prediction import arrays_of, prediction_of
+from langflash_core.reconstruction.finding import arrays_of, keep_of, prediction_of
 from langflash_core.types import Gaussians, Prediction
 
 PHOTOS = [asset_path("photos/books_left.jpg"), asset_path("photos/books_right.jpg")]

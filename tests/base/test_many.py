@@ -8,7 +8,7 @@ from torch.nn import functional as F
 from langflash_core.base import many
 from langflash_core.base.many import FEW, groups_of, held, in_groups, together
 from langflash_core.cameras import structure as cameras
-from langflash_core.cameras.retrieval import most_alike
+from langflash_core.cameras.retrieval import likeness
 from langflash_core.network import GuidedDepthNet, guided, load_network
 from langflash_core.network.encoders.shared import Tokens
 from langflash_core.network.layers.attention import Attention, QueryBlock
@@ -17,6 +17,7 @@ from langflash_core.network.presets import MINI
 from langflash_core.network.semantics.aggregation import average_atoms
 from langflash_core.network.semantics.grouping import SemanticGrouping, surviving, surviving_of
 from langflash_core.network.semantics.splitting import condensed
+from langflash_core.rig.pairs import best
 from langflash_core.rig.rig import DepthMaps
 
 VIEWS, SIDE = 11, 56
@@ -122,9 +123,9 @@ def test_photos_that_look_alike_are_found():
     places = [rng.normal(size=(40, 16)) for _ in range(3)]  # photos of three places in turn
     rows = [places[number % 3] + 0.1 * rng.normal(size=(40, 16)) for number in range(12)]
     unit = [own / np.linalg.norm(own, axis=1, keepdims=True) for own in rows]
-    for view, others in enumerate(most_alike([own.astype(np.float32) for own in unit], 3)):
-        assert others == [other for other in range(view % 3, 12, 3) if other != view]
-    assert most_alike([own.astype(np.float32) for own in unit[:2]], 3) == [[1], [0]]
+    for view, others in enumerate(best(likeness([own.astype(np.float32) for own in unit]), 3)):
+        assert sorted(others) == [other for other in range(view % 3, 12, 3) if other != view]
+    assert best(likeness([own.astype(np.float32) for own in unit[:2]]), 3) == [[1], [0]]
 
 
 def test_many_photos_are_encoded_and_described_as_few(network, images, tokens, monkeypatch):

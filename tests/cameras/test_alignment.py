@@ -6,7 +6,6 @@ from scipy.optimize import minimize
 
 from langflash_core.cameras.alignment import (
     _PRIOR_SIGMAS,
-    INDEPENDENT,
     NO_CORRECTION,
     fit_correction,
 )
@@ -44,7 +43,7 @@ def test_the_optimum_is_that_of_scipy():
 
     def cost(b):
         residuals = (targets - priors - design @ b) / total
-        share = INDEPENDENT / len(x)
+        share = STRAIGHTENING.independent / len(x)
         return share * 2 * np.log1p((residuals / 2) ** 2).sum() + 0.5 * ((b / _PRIOR_SIGMAS) ** 2).sum()
 
     own = fit_correction(x, priors, targets, sigmas).coefficients

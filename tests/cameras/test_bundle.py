@@ -11,9 +11,10 @@ from langflash_core.cameras import bundle as bundles
 from langflash_core.cameras.adjustment import Sought
 from langflash_core.cameras.bundle import Bundle, Optics, adjusted_bundle
 from langflash_core.cameras.inputs import PoseInput
-from langflash_core.cameras.keypoints import WORKING_SIDE, KeyPoints
+from langflash_core.cameras.keypoints import KeyPoints
 from langflash_core.cameras.poses import Poses, estimate_poses, on_other_maps
 from langflash_core.cameras.tracks import Tracks, joined, with_pairs
+from langflash_core.rig.settings import BUNDLE, MATCHING
 
 SIZE, FOCAL = (224, 168), 200.0  # 58.5 degrees
 
@@ -131,9 +132,8 @@ def test_the_adjustment_reaches_the_optimum_of_scipy(monkeypatch, bend):
     wrong = tracks.pixels.copy()
     wrong[::17] += 3.0
     tracks = replace(tracks, pixels=wrong)
-    monkeypatch.setattr(bundles, "_ROUNDS", 1)
-    monkeypatch.setattr(bundles, "_CONVERGED", 1e-12)
-    monkeypatch.setattr(bundles, "_ITERATIONS", 300)
+    exactly = replace(bundles.BUNDLE, rounds=1, converged=1e-12, iterations=300)
+    monkeypatch.setattr(bundles, "BUNDLE", exactly)
     optics = _rig(4, 1.1, 0.35, 0.15 if bend else 0.0)
     found = _adjusted(tracks, _shaken(true), log_depths, optics)
 
@@ -240,7 +240,7 @@ def _photos(viewmats: np.ndarray, *, said: float = 1.0, count: int = 300, seed: 
     points = _room(seed, count)
     pixels, z = _seen(viewmats, points, bend)
     K = np.array([[FOCAL * said, 0, SIZE[0] / 2], [0, FOCAL * said, SIZE[1] / 2], [0, 0, 1]])
-    ratio, middle = WORKING_SIDE / max(SIZE), np.array(SIZE) / 2
+    ratio, middle = MATCHING.working_side / max(SIZE), np.array(SIZE) / 2
     views, positions, numbers = [], [], []
     for own, depths in zip(pixels, z, strict=True):
         depth = np.full(SIZE[::-1], 3.0)
@@ -342,7 +342,7 @@ def test_other_depth_maps_bring_their_own_unit():
 def test_points_that_very_many_photos_saw_are_known_from_some_of_them():
     from langflash_core.cameras import tracks as module
 
-    lengths = (2, module._LONGEST, module._LONGEST + 1, 100)
+    lengths = (2, BUNDLE.longest, BUNDLE.longest + 1, 100)
     points = np.repeat(np.arange(4), lengths)
     views = np.concatenate([np.arange(length) for length in lengths])
     given = module.Tracks(
@@ -351,7 +351,7 @@ def test_points_that_very_many_photos_saw_are_known_from_some_of_them():
     kept = module._spread(given)
     for point, length in enumerate(lengths):
         own = views[(points == point) & kept]
-        assert len(own) == min(length, module._LONGEST) and own[0] == 0 and own[-1] == length - 1
+        assert len(own) == min(length, BUNDLE.longest) and own[0] == 0 and own[-1] == length - 1
         assert max(np.diff(own)) - min(np.diff(own)) <= 1
     few = given.subset(points < 2)[0]
     assert module._spread(few).all()

@@ -12,14 +12,12 @@ from langflash_core.cameras.graph import (
     Placed,
     adjusted,
     chained,
-    chosen_pairs,
-    closest,
     confirmed,
     gap,
     placed,
-    unconnected,
 )
 from langflash_core.cameras.matching import RelativePose
+from langflash_core.rig.settings import GRAPH
 
 INFORMATION = np.diag([4e6] * 3 + [4e4] * 3 + [400.0])
 
@@ -69,8 +67,8 @@ def test_exact_edges_give_the_exact_places():
 def test_an_edge_knows_what_its_matches_know_and_never_more_than_they_share():
     rng = np.random.default_rng(3)
     pose = _edge(_matrix([0.1, 0.2, 0.3], [0.4, 0.0, 0.1]))
-    shift = graph._SHIFT_SIGMA * (0.1 + np.linalg.norm(pose.translation))
-    shared = np.diag(np.array([graph._TURN_SIGMA] * 3 + [shift] * 3 + [graph._SCALE_SIGMA]) ** 2)
+    shift = GRAPH.shift_sigma * (0.1 + np.linalg.norm(pose.translation))
+    shared = np.diag(np.array([np.radians(GRAPH.turn_sigma)] * 3 + [shift] * 3 + [GRAPH.scale_sigma]) ** 2)
     root = rng.normal(size=(7, 7)) * [1e3, 1e3, 1e3, 1e2, 1e2, 1e2, 10]
     known = replace(pose, information=root.T @ root + np.eye(7))
     twin = np.linalg.inv(np.linalg.inv(known.information) + shared)
@@ -170,16 +168,3 @@ def test_nothing_and_one_edge_come_back_as_they_are():
     )  # float64 products with the identity
     same = placed(3, {(0, 1): _edge(np.eye(4)), (1, 2): _edge(np.eye(4)), (0, 2): _edge(np.eye(4))})
     assert isinstance(same, Placed) and np.isfinite(same.viewmats).all()  # one photo three times
-
-
-def test_pairs_are_each_photos_best_and_connect_all():
-    rng = np.random.default_rng(0)
-    near = {(i, j): int(300 / (j - i) ** 2 + rng.integers(3)) for i in range(12) for j in range(i + 1, 12)}
-    chosen = chosen_pairs(12, {edge: np.zeros((count, 2), int) for edge, count in near.items()})
-    assert all((v, v + 1) in chosen for v in range(11)) and len(chosen) < 35  # of 66
-    assert closest(12, near, 2)[5] in ((4, 6), (6, 4))
-    assert chosen_pairs(1, {}) == [] and chosen_pairs(2, {(0, 1): np.zeros((0, 2), int)}) == [(0, 1)]
-    # 0-1-2 and 3-4 have poses; the best of what lies between the two parts is asked.
-    pairs = {edge: _edge(np.eye(4)) for edge in ((0, 1), (1, 2), (3, 4))}
-    counts = {(0, 1): 90, (1, 2): 80, (3, 4): 70, (0, 3): 5, (2, 3): 9, (0, 2): 30}
-    assert unconnected(5, pairs, counts) == [(2, 3)]

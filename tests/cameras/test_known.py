@@ -4,11 +4,12 @@ import cv2
 import numpy as np
 import pytest
 
-from langflash_core.cameras.keypoints import WORKING_SIDE, KeyPoints
+from langflash_core.cameras.keypoints import KeyPoints
 from langflash_core.cameras.known import agreeing, depth_scales, doubt, explained, log_scales
 from langflash_core.cameras.matching import Matches
 from langflash_core.cameras.poses import PoseInput, estimate_poses
 from langflash_core.errors import InputError
+from langflash_core.rig.settings import MATCHING
 
 SIGMA = 1e-3
 
@@ -85,7 +86,7 @@ def seen_from_two_places() -> tuple[list[PoseInput], KeyPoints, np.ndarray]:
     matches, relative, _, _ = pair(count=200)
     K = np.array([[200.0, 0, 112], [0, 200, 112], [0, 0, 1]])
     view = PoseInput(K, (224, 224), np.full((224, 224), 3.0), np.zeros((4, 2, 2)))
-    pixels = [(x * 200 + 112) * (WORKING_SIDE / 224) for x in (matches.x_i, matches.x_j)]
+    pixels = [(x * 200 + 112) * (MATCHING.working_side / 224) for x in (matches.x_i, matches.x_j)]
     rows = np.repeat(np.arange(200)[:, None], 2, 1)
     return [view, view], KeyPoints(tuple(pixels), {(0, 1): rows}), relative
 

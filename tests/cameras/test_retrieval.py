@@ -4,7 +4,16 @@ from itertools import combinations
 
 import numpy as np
 
-from langflash_core.cameras.retrieval import ALL, likely_pairs
+from langflash_core.cameras.retrieval import likeness
+from langflash_core.rig.pairs import Pair
+from langflash_core.rig.pairs import likely_pairs as pairs_of
+from langflash_core.rig.settings import CHOICE
+
+ALL = CHOICE.all_matched
+
+
+def likely_pairs(photos: list[np.ndarray]) -> list[Pair]:
+    return pairs_of(len(photos), lambda: likeness(photos))
 
 
 def _unit(rows: np.ndarray) -> np.ndarray:

@@ -15,13 +15,14 @@ from app.gl.layered import MOVING
 from langflash_core import pipeline
 from langflash_core.export.html import write_html
 from langflash_core.export.page_columns import PLACE_STEPS
-from langflash_core.geometry.cameras import project, transform
+from langflash_core.geometry.cameras import transform
 from langflash_core.geometry.nearness import FLOOR, NEAREST, Nearness
 from langflash_core.splat import compose
 from langflash_core.types import Scene
 from tests.app.gl.test_gl_layers import layered
 from tests.export.pages import ReadPage, read_page
 from tests.export.test_html import PAGE, phrases_of
+from tests.geometry.twins import seen_at
 
 
 def ids_of(scene: Scene) -> torch.Tensor:
@@ -59,7 +60,7 @@ def test_layers_come_back_within_the_steps_of_their_photos(tmp_path):
     for view in range(3):
         own = ids == view
         places = [
-            torch.cat((project(pos_c, scene.Ks[view].double()), pos_c[:, 2:]), 1).T
+            torch.cat((seen_at(pos_c, scene.Ks[view].double()), pos_c[:, 2:]), 1).T
             for g in (found, ours.gaussians)
             for pos_c in [transform(scene.viewmats[view].double(), g.means[own].double())]
         ]

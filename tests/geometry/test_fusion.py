@@ -6,7 +6,8 @@ import numpy as np
 import pytest
 
 from langflash_core.errors import MissingPackageError
-from langflash_core.geometry.fusion import BAND, ColouredView, fuse
+from langflash_core.geometry.fusion import ColouredView, fuse
+from langflash_core.geometry.settings import FUSION
 
 CENTRE, RADIUS, VOXEL = np.array([0.0, 0.0, 2.0]), 0.5, 0.02
 LOW, HIGH = CENTRE - 0.5, CENTRE + 0.5
@@ -70,7 +71,7 @@ def test_a_surface_in_the_last_plane_of_voxels_is_there():
     depths[:, 16:] = 1.5  # so that something lies behind a surface
     view = ColouredView(depths, np.eye(4), K, np.zeros((32, 32, 3), np.uint8))
     voxel = 0.25  # as all numbers here, exact: the field is 0 at the farthest voxels
-    last = 2.0 - BAND * voxel
+    last = 2.0 - FUSION.band * voxel
     mesh = fuse([view], np.array([-0.5, -0.5, 1.0]), np.array([0.5, 0.5, last]), voxel)
     assert mesh is not None and float(mesh.vertices[:, 2].max()) == 2.0
 

@@ -8,10 +8,11 @@ import pytest
 import torch
 
 from langflash_core.geometry import poses, rotations
-from langflash_core.geometry.cameras import project, transform
+from langflash_core.geometry.cameras import transform
 from langflash_core.geometry.poses import FOV_RANGE, Pose, Rotation, Vector
 from langflash_core.geometry.quaternions import quats_to_matrices
 from langflash_core.geometry.reach import median_reach
+from tests.geometry.twins import seen_at
 
 # Poses are float64 and a few operations long; float32 enters only where a Camera is made.
 EXACT, SINGLE = 1e-9, 1e-5
@@ -78,7 +79,7 @@ def test_the_whole_photo_fits_any_panel(size: tuple[int, int], photo: tuple[int,
     camera = poses.to_camera(pose, *size)
     half = torch.tensor([photo[0] / 380.0, photo[1] / 380.0])  # tangents of the half angles
     corners = torch.tensor([[-half[0], -half[1], 1.0], [half[0], half[1], 1.0]])
-    pixels = project(transform(camera.viewmat, corners), camera.K)
+    pixels = seen_at(transform(camera.viewmat, corners), camera.K)
     (left, top), (right, bottom) = pixels.tolist()
     slack = 1e-2  # pixels; float32 at 900 pixels
     assert left >= -slack and top >= -slack and right <= size[0] + slack and bottom <= size[1] + slack

@@ -4,13 +4,14 @@ import pytest
 import torch
 
 from langflash_core.errors import PromptError
-from langflash_core.geometry.cameras import project, transform
+from langflash_core.geometry.cameras import transform
 from langflash_core.language.spaces import language_space
 from langflash_core.scene.bare import bare_scene
 from langflash_core.scene.checks import check_scene
 from langflash_core.scene.file import load, save
 from langflash_core.scene.report import describe
 from langflash_core.types import Gaussians
+from tests.geometry.twins import seen_at
 
 
 def splats(means: torch.Tensor) -> Gaussians:
@@ -29,7 +30,7 @@ def shown(scene, means: torch.Tensor) -> float:
     """Share of points in front of the scene's camera and inside its picture."""
     camera = scene.camera(0)
     pos_c = transform(camera.viewmat, means)
-    pixels = project(pos_c, camera.K)
+    pixels = seen_at(pos_c, camera.K)
     size = torch.tensor([camera.width, camera.height])
     return float((((pixels >= 0) & (pixels < size)).all(-1) & (pos_c[:, 2] > 0)).double().mean())
 

@@ -9,7 +9,7 @@ from torch import Tensor
 
 from langflash_core.surface.blocks import LARGEST, LEVELS, Squares, Tree, grown, leaves, padded, threshold
 from langflash_core.surface.clearance import clearances
-from langflash_core.surface.upsampling import JUMP
+from langflash_core.surface.settings import UPSAMPLING
 
 EVERYTHING = -1.0  # a threshold below all gains
 LEAST = 4e-5  # gain below which nobody parts anything
@@ -153,7 +153,7 @@ def test_partings_that_must_be_come_out_of_the_budget_and_on_top_where_it_is_too
 def test_squares_end_at_a_jump_of_depth_as_small_as_pixels(upright):
     photo = torch.full((3, 48, 48), 0.5)
     depths = torch.zeros(48, 48)
-    depths[:, 21:] = 2 * JUMP
+    depths[:, 21:] = 2 * UPSAMPLING.jump
     if not upright:
         depths = depths.T.contiguous()
     found, beneath = leaves(grown(photo, depths, endless(photo), all_wanted(photo)), torch.inf)
@@ -241,7 +241,7 @@ class Plain:
 
     def must(self, left: int, top: int, side: int) -> bool:
         depths = self.depths[top : top + side, left : left + side]
-        if any((np.abs(np.diff(depths, axis=axis)) > JUMP).any() for axis in (0, 1)):
+        if any((np.abs(np.diff(depths, axis=axis)) > UPSAMPLING.jump).any() for axis in (0, 1)):
             return True
         if self.clear[top : top + side, left : left + side].min() < (1.2 if side >= 4 else 0.5) * side:
             return True

@@ -6,7 +6,7 @@ import torch
 from torch import Tensor
 
 from langflash_core.surface.clearance import clearances
-from langflash_core.surface.upsampling import JUMP
+from langflash_core.surface.settings import UPSAMPLING
 
 CHAMFER = 0.025  # relative: steps of 1, 1.4 and 2.197 instead of the length
 
@@ -18,7 +18,7 @@ def ends(logs: np.ndarray) -> np.ndarray:
     for r, c in np.ndindex(height, width):
         beside = ((r + 1, c), (r - 1, c), (r, c + 1), (r, c - 1))
         inside = [(i, j) for i, j in beside if 0 <= i < height and 0 <= j < width]
-        if any(logs[place] - logs[r, c] > JUMP for place in inside):
+        if any(logs[place] - logs[r, c] > UPSAMPLING.jump for place in inside):
             found.append((r, c))
     return np.array(found).reshape(-1, 2)
 
@@ -28,7 +28,7 @@ def nearest(logs: np.ndarray, row: int, column: int) -> tuple[float, set[bool]]:
     places = ends(logs)
     distances = np.hypot(*(places - (row, column)).T)
     as_near = places[distances <= distances.min() * (1 + 2 * CHAMFER) + 1e-6]
-    hidden = {bool(logs[row, column] - logs[tuple(place)] > JUMP) for place in as_near}
+    hidden = {bool(logs[row, column] - logs[tuple(place)] > UPSAMPLING.jump) for place in as_near}
     return float(distances.min()), hidden
 
 
@@ -67,7 +67,7 @@ def test_clearances_are_distances_to_the_nearest_end(seed, size):
 def test_the_nearer_side_ends_and_the_farther_is_endless(turns):
     """Counted from the middles of pixels: a half beside the end, and one more a column."""
     logs = torch.zeros(9, 14)
-    logs[:, 6:] = 1.5 * JUMP
+    logs[:, 6:] = 1.5 * UPSAMPLING.jump
     expected = torch.full((9, 14), torch.inf)
     expected[:, :6] = torch.arange(6).flip(0) + 0.5
     found = clearances(torch.rot90(logs, turns).contiguous())
@@ -84,7 +84,7 @@ def test_three_walls_one_behind_the_other():
 
 
 @pytest.mark.parametrize("size", [(1, 1), (1, 7), (12, 15)])
-@pytest.mark.parametrize("step", [0.0, 0.9 * JUMP])
+@pytest.mark.parametrize("step", [0.0, 0.9 * UPSAMPLING.jump])
 def test_without_a_jump_nothing_ends(size, step):
     logs = step * torch.arange(size[0] * size[1]).view(size) / size[1]
     assert torch.equal(clearances(logs), torch.full(size, torch.inf))

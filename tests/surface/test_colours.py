@@ -20,7 +20,8 @@ from torch import Tensor
 from langflash_core.splat.mixing import mixing
 from langflash_core.splat.projection import project
 from langflash_core.splat.reference import rasterize
-from langflash_core.surface.colours import ROUNDS, solved_colours
+from langflash_core.surface.colours import solved_colours
+from langflash_core.surface.settings import COLOURS
 from langflash_core.types import Camera, Gaussians
 from tests.splat.scenes import camera, cloud, parallel, splats, turned
 
@@ -90,7 +91,7 @@ def test_equals_dense_float64_rounds():
     shown, total = matrix.sum(1) > 0.5, matrix.sum(0)
     colours = ahead = start.double().numpy()
     pace = 1.0
-    for _ in range(ROUNDS):
+    for _ in range(COLOURS.rounds):
         wrong = (photo.double().flatten(1).T.numpy() - matrix @ ahead) * shown[:, None]
         step = np.where(total > 0.05, 1 / np.maximum(total, 0.05), 0)[:, None] * (matrix.T @ wrong)
         found = np.clip(ahead + step, 0, 1)

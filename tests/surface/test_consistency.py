@@ -5,9 +5,11 @@ import itertools
 import pytest
 import torch
 
-from langflash_core.geometry.cameras import invert_rigid, project, transform, unproject
+from langflash_core.geometry.cameras import invert_rigid, transform, unproject
 from langflash_core.rig.rig import Rig
-from langflash_core.surface.consistency import TOLERANCE, outvoted, seen_through
+from langflash_core.surface.consistency import outvoted, seen_through
+from langflash_core.surface.settings import CONSISTENCY
+from tests.geometry.twins import seen_at
 
 K = torch.tensor([[30.0, 0, 16], [0, 30.0, 12], [0, 0, 1]])
 
@@ -79,13 +81,15 @@ def test_several_views_equal_their_twin():
     for view, other in itertools.permutations(range(4), 2):
         pos_c = transform(viewmats[other], means[view])
         for i, ((x, y), z) in enumerate(
-            zip(project(pos_c, Ks[other]).tolist(), pos_c[:, 2].tolist(), strict=True)
+            zip(seen_at(pos_c, Ks[other]).tolist(), pos_c[:, 2].tolist(), strict=True)
         ):
             if z <= 0 or not (0 <= x < 32 and 0 <= y < 24):
                 continue
             theirs, own = confidences[other, int(y), int(x)], confidences[view].flatten()[i]
             outvoted = theirs > own or (theirs == own and other < view)
-            expected[view, i] |= bool(z < (1 - TOLERANCE) * depths[other, int(y), int(x)] and outvoted)
+            expected[view, i] |= bool(
+                z < (1 - CONSISTENCY.tolerance) * depths[other, int(y), int(x)] and outvoted
+            )
     blocked = seen_through(Rig(viewmats, Ks, depths, confidences))
     assert expected.any() and torch.equal(blocked.flatten(1), expected)
 

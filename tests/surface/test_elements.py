@@ -13,11 +13,9 @@ from langflash_core.geometry.quaternions import quats_to_matrices
 from langflash_core.splat.projection import DILATION, project
 from langflash_core.splat.reference import rasterize
 from langflash_core.surface.blocks import Squares
-from langflash_core.surface.elements import _UNDER as UNDER
 from langflash_core.surface.elements import (
     COARSE,
     FINE,
-    OPACITY,
     Elements,
     drawn_in,
     ground,
@@ -26,7 +24,8 @@ from langflash_core.surface.elements import (
     placed,
     under,
 )
-from langflash_core.surface.upsampling import JUMP, Upsampled, upsampled
+from langflash_core.surface.settings import COVERING, UPSAMPLING
+from langflash_core.surface.upsampling import Upsampled, upsampled
 from langflash_core.types import Camera, Gaussians
 
 FLOAT32 = 2e-5  # relative: some hundred float32 roundings at most
@@ -127,7 +126,7 @@ def passed(deviation: float, spacing: float = 1.0, cut: float = 1 / 255) -> np.n
     for row in off.T:
         for column in off.T:
             if row.max() * column.max() > cut:
-                alpha = OPACITY * row[:, None] * column
+                alpha = COVERING.opacity * row[:, None] * column
                 left *= 1 - np.where(alpha < cut, 0, alpha)
     return left
 
@@ -156,7 +155,7 @@ def test_fine_elements_lie_on_the_plane_and_face_along_it(normal, ratio):
         normals = sight.camera.viewmat[:3, :3] @ quats_to_matrices(made.quats)[..., 2:]
         # 1 - cos of the angle; float32 differences of neighbours lose three of seven digits.
         assert float((normals[..., 0] @ facing).abs().min()) > 1 - 1e-4
-        assert torch.equal(made.opacities, torch.full((len(made),), OPACITY))
+        assert torch.equal(made.opacities, torch.full((len(made),), COVERING.opacity))
 
 
 @pytest.mark.parametrize("normal", SLANTED)
@@ -273,13 +272,13 @@ def test_a_square_of_two_surfaces_has_a_ground_of_each():
         )
 
 
-@pytest.mark.parametrize("gap", [0.9 * JUMP, 1.1 * JUMP])
+@pytest.mark.parametrize("gap", [0.9 * UPSAMPLING.jump, 1.1 * UPSAMPLING.jump])
 def test_a_square_is_of_two_surfaces_from_a_jump_on(gap):
     depth = Upsampled(
         torch.tensor([0.0, 0, 0, gap]).expand(4, 4), torch.zeros(4, 4).long(), torch.zeros(1, 1)
     )
     made = ground(squares(4, (4, 4)), torch.rand(3, 4, 4), depth)
-    assert len(made) == (2 if gap > JUMP else 1)
+    assert len(made) == (2 if gap > UPSAMPLING.jump else 1)
 
 
 def test_one_pixel_of_another_surface_has_a_ground_as_wide_as_itself():
@@ -322,7 +321,7 @@ def test_the_farther_surface_goes_on_under_the_nearer_one(dim, sign):
     assert torch.equal(made.log_depths, torch.ones(24))
     before = 13 if sign > 0 else 10
     across, along = (made.x, made.y) if dim == 1 else (made.y, made.x)
-    assert across.tolist() == pytest.approx([3 * (before + 0.5 + sign * UNDER / 2)] * 24)
+    assert across.tolist() == pytest.approx([3 * (before + 0.5 + sign * COVERING.under / 2)] * 24)
     assert sorted(along.tolist()) == pytest.approx([3 * (k + 0.5) for k in range(24)])
     row, column = made.cells // 24, made.cells % 24
     assert ((column if dim == 1 else row) == before).all()
@@ -340,8 +339,8 @@ def test_under_a_corner_and_behind_a_gap():
     log_depths[:10, :10] = 1.0
     made = under(log_depths, torch.rand(3, 20, 20), (20, 20))
     corner = int((made.cells == 9 * 20 + 9).nonzero())
-    assert float(made.x[corner]) == pytest.approx(9.5 + UNDER / 2 / 2**0.5)
-    assert float(made.y[corner]) == pytest.approx(9.5 + UNDER / 2 / 2**0.5)
+    assert float(made.x[corner]) == pytest.approx(9.5 + COVERING.under / 2 / 2**0.5)
+    assert float(made.y[corner]) == pytest.approx(9.5 + COVERING.under / 2 / 2**0.5)
     slit = torch.zeros(20, 20)
     slit[:, 7] = 1.0
     assert len(under(slit, torch.rand(3, 20, 20), (20, 20))) == 0

@@ -17,13 +17,11 @@ from scipy.optimize import least_squares
 from langflash_core.rig.rig import Rig
 from langflash_core.surface import exposure_compensation as module
 from langflash_core.surface.exposure_compensation import (
-    BLOCK,
-    GAIN_RANGE,
     ExposureCompensation,
     Pairs,
     solve_compensation,
-    source_pairs,
 )
+from langflash_core.surface.settings import EXPOSURE
 from tests.scene.plane import wall_prediction
 from tests.torch_threads import torch_threads
 
@@ -84,10 +82,10 @@ def shrinkage(pairs, truth: ExposureCompensation) -> torch.Tensor:
     """What the prior moves s and o by, (V, 2, 3), to first order: -(A + L)^-1 L x in the gauge."""
     num_views = len(truth.gains)
     known = torch.stack((truth.gains.log(), truth.offsets), -1).transpose(0, 1)  # (3, V, 2)
-    normal, _ = module._normal_equations(pairs, known, module.SIGMA)
+    normal, _ = module._normal_equations(pairs, known, EXPOSURE.sigma)
     gauge = torch.eye(num_views).double() - 1 / num_views
     gauge = torch.kron(gauge, torch.eye(2).double())
-    prior = torch.tensor([module.LOG_GAIN**-2, module.OFFSET**-2]).double().repeat(num_views)
+    prior = torch.tensor([EXPOSURE.log_gain**-2, EXPOSURE.offset**-2]).double().repeat(num_views)
     moved = torch.linalg.solve(gauge @ normal @ gauge + prior.diag(), -prior * known.flatten(1))
     return moved.view(3, num_views, 2).permute(1, 2, 0)
 
@@ -102,7 +100,7 @@ def test_known_lights_come_back_but_for_the_prior(num_views):
     # To first order the prior's pull is that step. It changes weights and slopes by its own size, in units of
     # sigma and of 1; float32 colours are off by 1e-7, and places by 1e-5 pixels of at most .1 a pixel.
     step = moved.abs().amax()
-    allowed = step * (step / module.SIGMA + 0.05) + 2e-5
+    allowed = step * (step / EXPOSURE.sigma + 0.05) + 2e-5
     assert (found.gains.log() - truth.gains.log() - moved[:, 0]).abs().amax() < allowed
     assert (found.offsets - truth.offsets - moved[:, 1]).abs().amax() < allowed
     assert centred(found)
@@ -111,7 +109,7 @@ def test_known_lights_come_back_but_for_the_prior(num_views):
 
 
 def test_without_a_prior_they_come_back_exactly(monkeypatch):
-    monkeypatch.setattr(module, "TOGETHER", 1e-6)
+    monkeypatch.setattr(module, "EXPOSURE", replace(EXPOSURE, together=1e-6))
     images, *rest = strip(3)
     truth = lights(3)
     found = compensate_exposure(photographed(images, truth), *rest)
@@ -161,7 +159,7 @@ def twin(pairs, num_views: int, channel: int, start: np.ndarray) -> np.ndarray:
     kept = pairs.counted[:, channel].numpy()
     a, b = (np.repeat(views.numpy(), kept.sum(1)) for views in (pairs.firsts, pairs.seconds))
     own, other = (colours[:, channel].numpy()[kept] for colours in (pairs.own, pairs.other))
-    deviations = np.array([module.LOG_GAIN, module.OFFSET])
+    deviations = np.array([EXPOSURE.log_gain, EXPOSURE.offset])
 
     def whole(free):
         most = free.reshape(-1, 2)
@@ -170,10 +168,10 @@ def twin(pairs, num_views: int, channel: int, start: np.ndarray) -> np.ndarray:
     def residuals(free):
         (s, o), x = whole(free).T, whole(free)
         gap = np.exp(s[a]) * own + o[a] - np.exp(s[b]) * other - o[b]
-        return np.concatenate((gap * np.exp(-(s[a] + s[b]) / 2) / module.SIGMA, (x / deviations).ravel()))
+        return np.concatenate((gap * np.exp(-(s[a] + s[b]) / 2) / EXPOSURE.sigma, (x / deviations).ravel()))
 
     def loss(z):
-        data, prior, one = z[: len(a)], z[len(a) :], module.TOGETHER
+        data, prior, one = z[: len(a)], z[len(a) :], EXPOSURE.together
         rho = np.concatenate((data / (1 + data) / one, prior))
         first = np.concatenate(((1 + data) ** -2 / one, np.ones_like(prior)))
         return np.stack((rho, first, np.concatenate((-2 * (1 + data) ** -3 / one, 0 * prior))))
@@ -184,7 +182,7 @@ def twin(pairs, num_views: int, channel: int, start: np.ndarray) -> np.ndarray:
 
 
 def test_the_minimum_is_that_of_its_twin(monkeypatch):
-    monkeypatch.setattr(module, "_SIGMAS", (*module._SIGMAS, *50 * (module.SIGMA,)))
+    monkeypatch.setattr(module, "_SIGMAS", (*module._SIGMAS, *50 * (EXPOSURE.sigma,)))
     images, *rest = strip(3)
     truth = lights(3)
     pairs = with_wrong(compared(photographed(images, truth), *rest), 0.3)
@@ -202,7 +200,7 @@ def test_the_steps_taken_are_enough(monkeypatch):
     images, *rest = strip(4)
     pairs = with_wrong(compared(photographed(images, lights(4)), *rest), 0.3)
     found = solve_compensation(pairs, 4)
-    monkeypatch.setattr(module, "_SIGMAS", (*module._SIGMAS, *50 * (module.SIGMA,)))
+    monkeypatch.setattr(module, "_SIGMAS", (*module._SIGMAS, *50 * (EXPOSURE.sigma,)))
     assert (found.gains - solve_compensation(pairs, 4).gains).abs().amax() < 1 / 255
 
 
@@ -358,16 +356,19 @@ def test_gains_stay_in_their_range_and_the_gauge_holds():
     images, *rest = strip(3, low=0.08, high=0.09)
     changed = images * torch.tensor([1.0, 1.0, 10.5])[:, None, None, None]
     found = compensate_exposure(changed, *rest)
-    low, high = GAIN_RANGE
+    low, high = EXPOSURE.gain_range
     assert found.gains.amin() >= low - 1e-12 and found.gains.amax() <= high + 1e-12
-    assert found.offsets.abs().amax() <= module.LARGEST_OFFSET + 1e-12
+    assert found.offsets.abs().amax() <= EXPOSURE.largest_offset + 1e-12
     assert centred(found)
 
 
 def test_the_order_of_photos_does_not_matter():
     images, depths, confidences, *rest = strip(5, shift=20)
     # Whole blocks lie on the very end of another photo, where rounding decides whether they lie within it.
-    inner = torch.nn.functional.pad(confidences[:, BLOCK:-BLOCK, BLOCK:-BLOCK], (BLOCK,) * 4)
+    inner = torch.nn.functional.pad(
+        confidences[:, EXPOSURE.block : -EXPOSURE.block, EXPOSURE.block : -EXPOSURE.block],
+        (EXPOSURE.block,) * 4,
+    )
     changed, order, rest = (
         photographed(images, lights(5)),
         torch.tensor([3, 0, 4, 2, 1]),
@@ -387,25 +388,6 @@ def test_equal_photos_give_equal_bits_and_the_input_stays():
     assert torch.equal(first.gains, second.gains) and torch.equal(first.offsets, second.offsets)
     assert first.gains.dtype == torch.float64
     assert all(torch.equal(a, b) for a, b in zip(photos, copies, strict=True))
-
-
-def test_partners_are_those_that_share_most_and_connect_all():
-    generator = torch.Generator().manual_seed(0)
-    shared = torch.randint(1, 100, (20, 20), generator=generator)
-    shared[:10, 10:] = shared[10:, :10] = 0
-    shared[3, 14] = 1
-    firsts, seconds = source_pairs(shared)
-    found = set(zip(firsts.tolist(), seconds.tolist(), strict=True))
-    assert len(found) == len(firsts) <= 2 * 20 * module.SOURCES
-    assert all((b, a) in found for a, b in found) and (3, 14) in found
-    both = shared + shared.T
-    for view in range(20):
-        best = [j for j in both[view].argsort(descending=True).tolist() if j != view][: module.SOURCES]
-        assert all(
-            (view, other) in found for other in best if both[view, other] > both[view].sort().values[-6]
-        )
-    none = source_pairs(torch.zeros(3, 3, dtype=torch.int64))
-    assert len(none[0]) == 0
 
 
 def test_light_is_refused_where_its_shape_is_wrong_and_corrects_one_or_all(unchecked):

@@ -13,10 +13,10 @@ from langflash_core.scene.checks import check_scene
 from langflash_core.scene.exposure import lit_camera
 from langflash_core.splat import render
 from langflash_core.surface import fine as module
-from langflash_core.surface.colours import ROUNDS
 from langflash_core.surface.detailed import assemble_detailed
 from langflash_core.surface.exposure_compensation import ExposureCompensation
 from langflash_core.surface.fine import _told, coloured_scene, covered_scene
+from langflash_core.surface.settings import COLOURS, LAYERS
 from langflash_core.types import Camera, Scene
 from tests.scene.photographed import GRID, Photographed, photographed, png
 from tests.torch_threads import torch_threads
@@ -89,7 +89,7 @@ def test_a_scene_and_its_record_are_whole(given, fine):
     detail, count = scene.record.detail, len(scene.gaussians)
     assert detail["elements"] == detail["coarse"] + detail["fine"] == count
     assert scene.levels is not None and int(scene.levels.sum()) == detail["fine"]
-    assert detail["rounds"] == ROUNDS and len(detail["photos_psnr_db"]) == 2
+    assert detail["rounds"] == COLOURS.rounds and len(detail["photos_psnr_db"]) == 2
     # Told of what is drawn, with each pixel's light made 1; so over black a little is lost at the borders.
     assert detail["photos_psnr_db"][0] > difference(scene, 0, given.photos[0]) - 1
     assert list(scene.record.cost.timings) == ["encoder", "assembly", "colours", "pruning"]
@@ -255,7 +255,7 @@ def test_colours_of_layers_are_the_same_with_several_threads(given):
 
 def test_of_many_photos_those_all_over_the_walk_keep_a_layer(monkeypatch):
     """Three of five that stand in a row: the first, the last and the middle one."""
-    monkeypatch.setattr(module, "MOST_LAYERS", 3)
+    monkeypatch.setattr(module, "LAYERS", replace(LAYERS, most=3))
     scene, _ = made(photographed(5))
     check_scene(scene)
     assert scene.view_ids is not None and scene.view_ids.unique().tolist() == [0, 2, 4]

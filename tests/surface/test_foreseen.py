@@ -18,7 +18,7 @@ from langflash_core.geometry.cameras import (
 from langflash_core.geometry.rotations import matrix
 from langflash_core.rig.rig import Rig
 from langflash_core.scene.doubts import ALONE, TORN
-from langflash_core.surface.foreseen import CELL, Foresight, _pointed, foresight
+from langflash_core.surface.foreseen import CELL, Foresight, draw_points, foresight
 from langflash_core.types import Camera
 
 VIEWS, WIDTH, HEIGHT = 4, 120, 90
@@ -114,10 +114,10 @@ def test_nothing_to_compare_says_nothing(seen):
 
 
 def test_points_fall_into_cells_as_one_by_one(seen):
-    """Twin of `_pointed`: a loop over points."""
+    """Twin of `draw_points`: a loop over points."""
     camera = Camera(seen.viewmats[2], seen.Ks[2], seen.depths.shape[2], seen.depths.shape[1])
     points = world_points(seen.depths[:1], seen.viewmats[:1], seen.Ks[:1])[0]
-    colours, depths = _pointed(points.T, seen.images[0].flatten(1), camera)
+    colours, depths = draw_points(points.T, seen.images[0].flatten(1), camera)
     cells: dict[tuple[int, int], list[tuple[float, Tensor]]] = {}
     pose = invert_rigid(camera.viewmat)
     for point, colour in zip(points, seen.images[0].flatten(1).T, strict=True):

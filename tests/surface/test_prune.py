@@ -9,7 +9,8 @@ import torch
 from langflash_core.scene.checks import check_scene
 from langflash_core.splat.reference import render
 from langflash_core.surface.assemble import assemble
-from langflash_core.surface.prune import CUT, _parents, _sight, prune
+from langflash_core.surface.prune import _parents, _sight, prune
+from langflash_core.surface.settings import PRUNING
 from langflash_core.types import Scene
 from tests.scene.plane import wall_prediction
 
@@ -111,7 +112,7 @@ def test_every_pair_is_a_duplicate_and_no_parent_has_two_children_of_a_view():
 def test_faint_gaussians_go_and_nothing_changes():
     scene = wall_scene(1)
     opacities = scene.gaussians.opacities.clone()
-    opacities[::3] = CUT * 0.99
+    opacities[::3] = PRUNING.cut * 0.99
     scene = replace(scene, gaussians=replace(scene.gaussians, opacities=opacities))
     small = prune(scene)
     assert small.record.pruning["faint"] == len(opacities[::3])

@@ -10,13 +10,13 @@ from torch import Tensor
 from langflash_core.geometry.cameras import (
     intrinsics_from_fov,
     invert_rigid,
-    project,
     rays,
     transform,
     unproject,
 )
 from langflash_core.rig.rig import Rig
 from langflash_core.surface.transients import _CELL, _Look, transient_masks
+from tests.geometry.twins import seen_at
 
 WIDTH, HEIGHT = 96, 72
 WALL = 3.0
@@ -151,7 +151,7 @@ def test_what_is_foreseen_is_what_a_plain_loop_finds():
     points = transform(other @ invert_rigid(viewmat), unproject(depths, K).flatten(0, 1))
     cells: dict[tuple[int, int], list[tuple[float, int]]] = {}
     for number, ((x, y), z) in enumerate(
-        zip(project(points, K).tolist(), points[:, 2].tolist(), strict=True)
+        zip(seen_at(points, K).tolist(), points[:, 2].tolist(), strict=True)
     ):
         row, column = math.floor(y / _CELL), math.floor(x / _CELL)
         if z > 0 and 0 <= row < size[0] and 0 <= column < size[1]:

@@ -12,7 +12,9 @@ from langflash_core.geometry.cameras import intrinsics_from_fov, invert_rigid, r
 from langflash_core.geometry.vantage import from_the_middle, leading
 from langflash_core.rig.rig import Rig
 from langflash_core.surface import view_selection
-from langflash_core.surface.view_selection import BEFORE, BEHIND
+from langflash_core.surface.settings import VIEW_SELECTION
+
+BEHIND, BEFORE = VIEW_SELECTION.behind, VIEW_SELECTION.before
 
 HEIGHT, WIDTH = 24, 32
 WALL = (0.0, 0.0, 1.0), 3.0  # n x = d, in the world

@@ -9,7 +9,8 @@ Read as text: nothing of a checkout is imported. The lab is left out. What is co
 - neighbour rules: functions that choose photos for a photo, or pairs of photos
 - bare participles: functions whose name is one (`told`, `blended`)
 - rooms, returns: modules that `pipeline.reconstruct` gets into by calls, in the order of the source, each
-  function once; and how often it gets into one that it had left
+  function once; and how often it gets into one that it had left. A method that one class alone has is that
+  one's where the module that calls imports its module, itself or through others
 """
 
 import argparse
@@ -21,19 +22,20 @@ from pathlib import Path
 
 CORE = "langflash_core"
 START = f"{CORE}.pipeline.reconstruct"
-PRIMITIVES = (f"{CORE}.geometry.cameras", f"{CORE}.rig")
+PRIMITIVES = (f"{CORE}.geometry.cameras", f"{CORE}.geometry.pinhole", f"{CORE}.rig")
 FUNCTIONS = (ast.FunctionDef, ast.AsyncFunctionDef)
 IRREGULAR = re.compile(
     "begun|bent|bound|brought|built|caught|chosen|cut|done|drawn|felt|found|given|gone|grown|held|kept|known|"
     "laid|led|left|lit|lost|made|meant|met|put|read|said|seen|sent|set|shown|sought|spent|split|spoken|spread|"
     "stood|swept|taken|taught|thought|told|torn|understood|woven|written"
 )
-PROJECTING = (f"{CORE}.geometry.cameras.pictured", f"{CORE}.geometry.cameras.project")
+PROJECTING = tuple(f"{CORE}.geometry.{name}" for name in ("cameras.project", "pinhole.to_pixels"))
 CHOOSING = re.compile(
     r"list\[(int|list\[int\]|tuple\[int, int\])\]|tuple\[tuple\[int, \.\.\.\], \.\.\.\]|"
     r"Neighbours|Chosen|tuple\[Int\[Tensor, ' E'\], Int\[Tensor, ' E'\]\]"
 )
-OF_PHOTOS = {"viewmats", "num_views", "descriptors", "shared", "counts", "worth", "camera", "view", "rig"}
+OF_A_PHOTO = {"camera", "view"}
+OF_PHOTOS = OF_A_PHOTO | {"viewmats", "num_views", "descriptors", "shared", "counts", "worth", "rig"}
 
 
 def modules(checkout: Path) -> dict[str, ast.Module]:
@@ -118,9 +120,12 @@ def is_reprojection(function: ast.AST, known: dict[str, str]) -> bool:
 
 
 def is_neighbour_rule(function: ast.FunctionDef | ast.AsyncFunctionDef) -> bool:
+    """It gives one list of photos and is asked about a photo, or pairs, or a list for each; a list that is
+    of all photos, such as their order, is none."""
     returns = ast.unparse(function.returns) if function.returns else ""
     given = {one.arg for one in (*function.args.args, *function.args.kwonlyargs)}
-    return bool(CHOOSING.fullmatch(returns)) and bool(given & OF_PHOTOS)
+    asked = OF_A_PHOTO if returns == "list[int]" else OF_PHOTOS
+    return bool(CHOOSING.fullmatch(returns)) and bool(given & asked)
 
 
 def is_bare_participle(name: str) -> bool:
@@ -148,7 +153,17 @@ class Walk:
         for path in self._bodies:
             if path.count(".") and path.rsplit(".", 1)[0] in self._classes:
                 self._methods.setdefault(path.rsplit(".", 1)[1], []).append(path)
+        self._near = {m: self._reached(m, set()) for m in trees}
         self._visited, self.entered = set[str](), list[str]()
+
+    def _reached(self, module: str, found: set[str]) -> set[str]:
+        """Modules that one imports, itself or through others, added to those found."""
+        for path in self._known.get(module, {}).values():
+            for other in (path, path.rpartition(".")[0]):
+                if other in self._known and other not in found:
+                    found.add(other)
+                    self._reached(other, found)
+        return found
 
     def follow(self, path: str) -> None:
         if path in self._visited or path not in self._bodies:
@@ -170,7 +185,8 @@ class Walk:
         if isinstance(called, ast.Attribute):
             own = self._methods.get(called.attr, [])
             near = [path for path in own if path.startswith(f"{module}.")]
-            return near or (own if len(own) == 1 else [])
+            alone = len(own) == 1 and self._bodies[own[0]][0] in self._near[module]
+            return near or (own if alone else [])
         return []
 
     @property

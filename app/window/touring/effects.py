@@ -44,7 +44,7 @@ class TouringEffects(Effects):
         found = project(np.array([end]), state.scene.pose, size)
         if found is None:
             return False
-        (depth, (x, y)) = float(found[0][0, 2]), found[1][0].tolist()
+        (depth, (x, y)) = float(found[0][0]), found[1][0].tolist()
         if not (0 <= x < size[0] and 0 <= y < size[1]):
             return False
         read = self._viewport.read((x, y))

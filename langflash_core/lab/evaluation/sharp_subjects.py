@@ -27,7 +27,7 @@ from langflash_core.lab.photos import LabelledPhoto, PhotoFolder
 from langflash_core.lab.photos.folder import lenses_of
 from langflash_core.lab.rooms import Pack, RoomRenderer, RoomViews, staged_room
 from langflash_core.lab.training.commands import cache_plan
-from langflash_core.surface.detailed import MOST_ENLARGED
+from langflash_core.surface.settings import LAYERS
 
 _LEFT = re.compile(r"(.+)_left")
 
@@ -72,11 +72,11 @@ class Subject:
 
 def sharp_size(photo: tuple[int, int], grid: tuple[int, int]) -> tuple[int, int]:
     """(width, height) at which a photo is compared: of exactly the grid's shape, as large as the photo's crop
-    but at most `MOST_ENLARGED` times the grid; sizes are (width, height)."""
+    but at most `LAYERS.most_enlarged` times the grid; sizes are (width, height)."""
     left, _, right, _ = centre_box(*photo, grid)
     divisor = math.gcd(*grid)
     columns, rows = grid[0] // divisor, grid[1] // divisor
-    steps = min(MOST_ENLARGED * divisor, max(1, int((right - left) / columns + 1e-6)))
+    steps = min(LAYERS.most_enlarged * divisor, max(1, int((right - left) / columns + 1e-6)))
     return columns * steps, rows * steps
 
 
@@ -146,7 +146,7 @@ def room_subjects(
     *,
     kind: str = "held_out",
     count: int = 20,
-    times: int = MOST_ENLARGED,
+    times: int = LAYERS.most_enlarged,
 ) -> Iterator[Subject]:
     """Rooms of a set of `lab train cache`, made again from their seeds, `times` as large, with their
     third view as the photo from between.

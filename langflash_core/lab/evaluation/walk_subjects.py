@@ -33,7 +33,7 @@ from langflash_core.lab.rooms.layout import Room
 from langflash_core.lab.rooms.render import Picture
 from langflash_core.lab.rooms.sensor import expose
 from langflash_core.lab.training.commands import cache_plan
-from langflash_core.surface.detailed import MOST_ENLARGED
+from langflash_core.surface.settings import LAYERS
 
 PHOTOS = (2, 4, 8, 16, 32)
 KEPT = 8
@@ -165,7 +165,7 @@ class Camcorder:
     exposure: float = 0.0
     blur: float = 0.0
     bend: float = 0.0
-    times: int = MOST_ENLARGED
+    times: int = LAYERS.most_enlarged
     passers: int = 0
     screens: int = 0
 

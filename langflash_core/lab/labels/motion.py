@@ -13,11 +13,12 @@ from jaxtyping import Float, UInt8
 from torch import Tensor
 
 from langflash_core.base.running import Run, evenly
-from langflash_core.geometry.cameras import intrinsics_from_fov, pixel_grid, project, transform, unproject
+from langflash_core.geometry.cameras import intrinsics_from_fov, pixel_grid, transform, unproject
 from langflash_core.images.lens import ASSUMED_FOV
 from langflash_core.images.pictures import fitting_size
 from langflash_core.lab.labels.clips import Clip
 from langflash_core.network import LangFlashNet
+from langflash_core.rig.projected import see_points
 from langflash_core.types import Views
 
 Image = UInt8[np.ndarray, "H W 3"]
@@ -93,7 +94,8 @@ def _carried(depths: Tensor, viewmats: Tensor, Ks: Tensor) -> Step:
     """From view 0, the world, to view 1."""
     height, width = depths.shape[-2:]
     points = transform(viewmats[1], unproject(depths[0], Ks[0]))  # (H, W, 3)
-    places = project(points, Ks[1])[..., :2]
+    there = see_points(points.flatten(0, 1).T, Ks[1], (height, width))
+    places = torch.stack((there.x, there.y), -1).view(height, width, 2)
     step = (places - pixel_grid(width, height, like=depths)).numpy()
     then = _sampled(depths[1].numpy(), step)
     hidden = points[..., 2].numpy() > (1 + _NEARER) * then

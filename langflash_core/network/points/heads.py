@@ -13,12 +13,9 @@ from langflash_core.geometry.quaternions import unit_quats
 from langflash_core.network.encoders.vit import centred
 from langflash_core.network.layers.dpt import DPT, double
 from langflash_core.network.presets import PointMaps
+from langflash_core.network.settings import POINT_HEADS
 from langflash_core.types import Gaussians
 
-_SCALE_STEP = 1e-3  # of a softplus; lengths where the cameras of a pair are about 1 apart
-_MAX_SCALE = 0.3
-_DEGREE_STEP = 0.25  # each further degree of the harmonics starts this much smaller
-_FIRST_DEGREE = 0.1
 Levels = tuple[Tensor, Tensor, Tensor, Tensor]
 
 
@@ -93,7 +90,7 @@ def activated(raw: Float[Tensor, "V R H W"], points: Float[Tensor, "V 3 H W"]) -
         raw: (V, 8 + 3 S, H, W). points: (V, 3, H, W).
     """
     raw = raw.movedim(1, -1).flatten(0, 2).float()  # (N, 8 + 3 S)
-    scales = (_SCALE_STEP * F.softplus(raw[:, 1:4])).clamp_max(_MAX_SCALE)
+    scales = (POINT_HEADS.scale_step * F.softplus(raw[:, 1:4])).clamp_max(POINT_HEADS.max_scale)
     sh = raw[:, 8:].unflatten(1, (3, -1)).transpose(1, 2)  # (N, S, 3)
     return Gaussians(
         means=points.movedim(1, -1).flatten(0, 2).float(),
@@ -107,4 +104,4 @@ def activated(raw: Float[Tensor, "V R H W"], points: Float[Tensor, "V 3 H W"]) -
 def _damping(bases: int) -> Tensor:
     """(S,): 1 for degree 0, then 0.1 * 0.25^degree."""
     degrees = torch.arange(bases).float().sqrt().floor()
-    return torch.where(degrees == 0, 1.0, _FIRST_DEGREE * _DEGREE_STEP**degrees)
+    return torch.where(degrees == 0, 1.0, POINT_HEADS.first_degree * POINT_HEADS.degree_step**degrees)

@@ -13,13 +13,9 @@ from jaxtyping import Float
 from torch import Tensor
 
 from langflash_core.cameras.placing import place_camera
-from langflash_core.geometry.cameras import pixel_grid, project, transform
-
-_POINTS = 4000  # a regular sample; more change the pose by less than its error
-_TOLERANCE = 2.0  # pixels at 256: how far points stray in a good map
-_MIN_SHARE = 0.25  # of the sample must agree, or the map is no picture of one place
-_HALF_TRUST = 3.0  # pixels of error that count as confidence 1/2
-_NEAREST = 1e-4  # share of the median depth; points behind the camera are put there
+from langflash_core.geometry.cameras import pixel_grid
+from langflash_core.network.settings import RESECTION
+from langflash_core.rig.projected import project_points
 
 
 @dataclass(frozen=True)
@@ -31,7 +27,7 @@ class Resection:
 
     @property
     def trusted(self) -> bool:
-        return self.share >= _MIN_SHARE
+        return self.share >= RESECTION.min_share
 
 
 def resect(points: Float[Tensor, "3 H W"], K: Float[Tensor, "3 3"]) -> Resection:
@@ -41,12 +37,12 @@ def resect(points: Float[Tensor, "3 H W"], K: Float[Tensor, "3 3"]) -> Resection
         points: world, any unit. K: (3, 3) pixels.
     """
     height, width = points.shape[-2:]
-    step = max(1, int((height * width / _POINTS) ** 0.5))
+    step = max(1, int((height * width / RESECTION.points) ** 0.5))
     grid = pixel_grid(width, height, like=points)[::step, ::step].reshape(-1, 2)
     sample = points[:, ::step, ::step].flatten(1).T
     usable = torch.isfinite(sample).all(1)
     pos_w, pixels = sample[usable].double().cpu().numpy(), grid[usable].double().cpu().numpy()
-    tolerance = _TOLERANCE * max(height, width) / 256
+    tolerance = RESECTION.tolerance * max(height, width) / 256
     found = place_camera(pos_w, pixels, K.double().cpu().numpy(), tolerance)
     return Resection(np.eye(4), 0.0) if found is None else Resection(found.viewmat, float(found.agree.mean()))
 
@@ -62,13 +58,11 @@ def depths_and_confidences(
     Returns:
         depths and confidences, (V, H, W): 1 / (1 + error / 3 px), 0 behind the camera.
     """
-    _, _, height, width = points.shape
-    pos_c = transform(viewmats, points.flatten(2).transpose(1, 2))  # (V, H*W, 3)
-    z = pos_c[..., 2].unflatten(1, (height, width))
-    errors = project(pos_c, Ks[:, None]).unflatten(1, (height, width)) - pixel_grid(
-        width, height, like=points
-    )
-    trust = 1 / (1 + errors.norm(dim=-1) / (_HALF_TRUST * max(height, width) / 256))
+    height, width = size = points.shape[2], points.shape[3]
+    there = project_points(points.flatten(2), viewmats, Ks, size)
+    z = there.z.unflatten(1, size)
+    errors = torch.stack((there.x, there.y), -1).unflatten(1, size) - pixel_grid(width, height, like=points)
+    trust = 1 / (1 + errors.norm(dim=-1) / (RESECTION.half_trust * max(height, width) / 256))
     ahead = (z > 0) & torch.isfinite(trust)
-    floor = _NEAREST * z[ahead].median() if bool(ahead.any()) else z.new_tensor(_NEAREST)
+    floor = RESECTION.nearest * z[ahead].median() if bool(ahead.any()) else z.new_tensor(RESECTION.nearest)
     return torch.where(ahead, z, floor).clamp_min(floor), torch.where(ahead, trust, 0.0)

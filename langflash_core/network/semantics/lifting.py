@@ -15,11 +15,11 @@ from jaxtyping import Float
 from torch import Tensor
 from torch.nn import functional as F
 
-from langflash_core.geometry.cameras import project, transform
 from langflash_core.network.model import Geometry
 from langflash_core.network.presets import MaskFilter
 from langflash_core.network.semantics.grouping import Groups
 from langflash_core.network.semantics.residual import filtered
+from langflash_core.rig.projected import project_points
 
 SURE = MaskFilter(min_score=0.7, min_stability=0.9, offset=1.0, min_area=100, max_overlap=0.7)
 """Between SAM's own values (0.88, 0.95) and the lax ones of the released grouping: a photo of 256
@@ -89,14 +89,12 @@ def _shares(labels: Tensor, total: int, geometry: Geometry, Ks: Tensor) -> dict[
 
 def _looked_up(points: Tensor, geometry: Geometry, Ks: Tensor, view: int) -> tuple[Tensor, Tensor]:
     """Which of the points (H, W, 3) a view sees, and at which of its pixels; flat indices (n,) each."""
-    height, width = points.shape[:2]
-    pos_c = transform(geometry.viewmats[view], points.flatten(0, 1))
-    pixels = project(pos_c, Ks[view].to(pos_c)).floor()
-    inside = (pixels >= 0).all(-1) & (pixels[:, 0] < width) & (pixels[:, 1] < height) & (pos_c[:, 2] > 0)
-    seen = inside.nonzero()[:, 0]
-    place = (pixels[seen, 1] * width + pixels[seen, 0]).long()
+    size, flat = (points.shape[0], points.shape[1]), points.flatten(0, 1).T
+    there = project_points(flat, geometry.viewmats[view], Ks[view].to(flat), size)
+    seen = there.inside.nonzero()[:, 0]
+    place = there.pixels[seen]
     depths = geometry.depths[view].flatten()[place]
-    same = (pos_c[seen, 2] - depths).abs() <= _SAME_DEPTH * depths
+    same = (there.z[seen] - depths).abs() <= _SAME_DEPTH * depths
     return seen[same], place[same]
 
 

@@ -24,7 +24,7 @@ from langflash_core.lab.evaluation.sharp_subjects import (
 from langflash_core.lab.evaluation.sharp_tables import paired_difference, sharp_markdown
 from langflash_core.lab.photos import PhotoFolder
 from langflash_core.lab.rooms import RoomRenderer, load_pack
-from langflash_core.surface.detailed import MOST_ENLARGED
+from langflash_core.surface.settings import LAYERS
 from langflash_core.types import Camera, Frame, Scene
 from tests.lab.evaluation.real_photos import knowing, write_folder
 from tests.lab.rooms.conftest import TINY_PACK
@@ -158,7 +158,7 @@ def test_pictures_are_shown_with_the_photo_first(folder, program):
 )
 def test_the_size_of_a_photo(photo, grid, size):
     assert sharp_size(photo, grid) == size
-    assert size[0] * grid[1] == size[1] * grid[0] and size[0] <= MOST_ENLARGED * grid[0]
+    assert size[0] * grid[1] == size[1] * grid[0] and size[0] <= LAYERS.most_enlarged * grid[0]
 
 
 def test_pairs_of_files_and_folders(tmp_path):

@@ -108,11 +108,11 @@ def _frusta(state: State, look: Look, corner: ImVec2, size: ImVec2) -> list[do.C
     issued: list[do.Command] = []
     canvas = imgui.get_window_draw_list()
     shown = [
-        (float(pos_c[:, 2].mean()), view, points)
+        (float(depths.mean()), view, points)
         for view, pose in enumerate(state.scene.info.views)
         if (projected := poses.project(frustum(pose), state.scene.pose, (size.x, size.y))) is not None
         and state.scene.view != view
-        for pos_c, points in [projected]
+        for depths, points in [projected]
     ]
     for _, view, points in sorted(shown, key=lambda each: -each[0]):  # far ones first
         tip, *base = [ImVec2(corner.x + float(x), corner.y + float(y)) for x, y in points]
