@@ -21,6 +21,7 @@ from langflash_core.cameras.keypoints import KeyPoints, match_sources
 from langflash_core.cameras.placing import place_camera
 from langflash_core.errors import InputError
 from langflash_core.geometry.cameras import fov_degrees
+from langflash_core.geometry.pinhole import from_pixels
 from langflash_core.images.decode import PhotoFacts, read_photo
 from langflash_core.images.lens import ASSUMED_FOV, exif_fov
 from langflash_core.images.pictures import MAX_PHOTOS
@@ -151,10 +152,14 @@ def _place(scene: Scene, matches: KeyPoints, number: int, view: Views) -> _Place
 
 def _seen_at(scene: Scene, view: int, pixels: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, "n 3"]:
     """Points of the world that a photo's own layer shows at key points (`KeyPoints.positions`); no numbers
-    where it shows none."""
+    where it shows none. The layer says how far away they are, the pixels in which direction."""
     means, camera = scene.layer(view).gaussians.means.T, scene.camera(view)
-    points, depths = draw_points(means, means, camera)
-    cells = torch.from_numpy(pixels * max(scene.view_size) / MATCHING.working_side / CELL).long()
-    x, y = (cells[:, axis].clamp(0, side - 1) for axis, side in enumerate(reversed(depths.shape)))
-    there = torch.isfinite(depths[y, x])
-    return torch.where(there[:, None], points[:, y, x].T.double(), torch.nan).numpy()
+    viewmat, pixels = camera.viewmat.double().numpy(), pixels * (max(scene.view_size) / MATCHING.working_side)
+    points, nearest = draw_points(means, means, camera)
+    places = torch.from_numpy(pixels / CELL).long()
+    x, y = (places[:, axis].clamp(0, side - 1) for axis, side in enumerate(reversed(nearest.shape)))
+    there, some = torch.isfinite(nearest[y, x]).numpy(), points[:, y, x].double().numpy()
+    depths = np.where(there, viewmat[2, :3] @ some + viewmat[2, 3], np.nan)
+    rays = from_pixels(pixels, camera.K.double().numpy())
+    seen = np.column_stack((rays * depths[:, None], depths))
+    return (seen - viewmat[:3, 3]) @ viewmat[:3, :3]

@@ -57,7 +57,8 @@ class MergeScene:
 
 @dataclass(frozen=True)
 class AddToScene:
-    """Give the scene on show a layer of each of these photos; replaces a job under way."""
+    """Make the scene on show, as it is edited, with a layer of each of these photos; it is left as it is, one
+    click away. Replaces a job under way."""
 
     photos: tuple[Path, ...]
 
@@ -82,8 +83,7 @@ def can_grow(state: State, count: int) -> bool:
 class Merged:
     """The scene with number `serial`, of which there was so much, and another as one scene; or, where `gone`
     says what was taken away, what fills its hole, or stands for it but is not what is `denied`; or `copied`,
-    copies of what was selected, or laid over what is `gone`. beyond: how much of `gone` was not selected.
-    added: what came are layers of more photos."""
+    copies of what was selected, or laid over what is `gone`. beyond: how much of `gone` was not selected."""
 
     serial: int
     there: tuple[int, int]
@@ -93,7 +93,6 @@ class Merged:
     copied: bool = False
     denied: str = ""
     beyond: int = 0
-    added: bool = False
 
     @property
     def said(self) -> str:
@@ -116,9 +115,7 @@ class Merged:
         if self.fits(state):
             return state
         text = f"{self.name} was not merged, since another scene is open now; merge it again."
-        if self.added:
-            text = f"{self.name} was not added, since another scene is open now; add it again."
-        elif self.denied:
+        if self.denied:
             text = "Nothing was removed, since the scene has changed; click it again."
         elif self.copied:
             text = "Nothing was copied, since the scene has changed; copy it again."
@@ -145,8 +142,6 @@ class Merged:
                 label = f"Remove a part of {self.denied}"
         elif self.copied:
             label = f"Copy {len(brought):,}"
-        elif self.added:
-            after, label = replace(before.marks, there=whole.there), f"Add {self.name}"
         history = before.edited(label, after)
         if saved is not None:
             saved = saved.of_size(self.there[0], saved.atoms[: self.there[1]]).of_size(count, whole.atoms)

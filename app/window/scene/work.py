@@ -37,7 +37,7 @@ from .commands import (
 )
 from .lenses import told_lenses
 from .memory import SceneMemory
-from .merging import Merged, called_photos
+from .merging import Merged
 from .standing import Levelled
 from .state import ABOVE, WHOLE_PHOTOS, SceneInfo
 
@@ -137,27 +137,20 @@ class JoinScenes(Job):
 
 @dataclass(frozen=True)
 class PutInPhotos(Job):
-    """Give the scene on show, as far as that is there, a layer of each of these photos."""
+    """The scene on show, as it is edited, with a layer of each of these photos."""
 
     info: SceneInfo
     marks: Marks = field(repr=False)
     photos: tuple[Path, ...]
     networks: Networks = field(default_factory=Networks, repr=False, compare=False)
 
-    def run(self, serial: int, progress: Callable[[str, float], None], cancelled: Asked) -> Merged:
+    def run(self, serial: int, progress: Callable[[str, float], None], cancelled: Asked) -> SceneArrived:
         from langflash_core.pipeline import add_photos
-        from langflash_core.scene.edited import there
+        from langflash_core.scene.edited import edited_scene
 
-        own = self.info
-        scene = add_photos(
-            there(own.scene, self.marks),
-            self.photos,
-            progress=progress,
-            cancelled=cancelled,
-            networks=self.networks,
-        )
-        info = describe_scene(scene, serial, own.name, own.path)
-        return Merged(own.serial, self.marks.there, info, called_photos(self.photos), added=True)
+        shown = edited_scene(self.info.scene, self.marks)
+        grown = add_photos(shown, self.photos, progress=progress, cancelled=cancelled, networks=self.networks)
+        return SceneArrived(describe_scene(grown, serial, self.info.name))
 
 
 def _restored(info: SceneInfo, edits: Path) -> SceneInfo:

@@ -80,7 +80,7 @@ def _additions(state: State) -> list[do.Command]:
 
 def _addition_says(state: State, grows: bool) -> str:
     if grows:
-        return "Each becomes a layer of its own; what the room has, and its edits, stay as they are"
+        return "Each becomes a layer beside those of the room; the room as it is stays one click away"
     if state.scene.photos:
         return "Reconstruct from the photos in the tray plus these"
     return "This room came from a file; its photos are not in the tray"

@@ -1,0 +1,71 @@
+"""`langflash add`: from a photo to a scene that has it, too."""
+
+import io
+
+import numpy as np
+import pytest
+import torch
+from PIL import Image
+from tests.app.cli.conftest import stripes
+
+from langflash_core.base.resources import asset_path
+from langflash_core.scene.file import load, save
+
+
+@pytest.fixture(scope="module")
+def photos(tmp_path_factory):
+    """A desk from two places, small, and the right one again in another file."""
+    folder = tmp_path_factory.mktemp("desk")
+    for name in ("left", "right"):
+        with Image.open(asset_path(f"photos/desk_{name}.png")) as picture:
+            picture = picture.convert("RGB")
+            picture.thumbnail((480, 480))
+            picture.save(folder / f"{name}.jpg", quality=95)
+            if name == "right":
+                picture.save(folder / "again.jpg", quality=85)
+    return folder
+
+
+@pytest.fixture(scope="module")
+def scene(photos, tmp_path_factory):
+    from langflash_core.pipeline import reconstruct
+
+    path = tmp_path_factory.mktemp("scene") / "desk.langflash"
+    save(reconstruct([photos / "left.jpg", photos / "right.jpg"], detail="low"), path)
+    return path
+
+
+def test_a_photo_taken_again_stands_where_it_stood(run, scene, photos, tmp_path):
+    output = tmp_path / "more.langflash"
+    outcome = run("add", scene, photos / "again.jpg", "-o", output)
+    assert outcome.code == 0, outcome.err
+    assert "1 photo more, 3 in all" in outcome.out
+    before, after = load(scene), load(output)
+    assert after.record.photos == ("left.jpg", "right.jpg", "again.jpg") and len(after.photos) == 3
+    count = len(before.gaussians)
+    assert torch.equal(after.gaussians.means[:count], before.gaussians.means)
+    assert len(after.gaussians) > 1.2 * count  # a layer like the other two
+    # Key points of a copy are the same but for JPEG's noise, a tenth of a pixel at a focal length of 650: what
+    # is left are the layer's depths, right to a hundredth, of things a unit away.
+    moved = after.viewmats[2] - after.viewmats[1]
+    assert float(moved[:3, :3].abs().max()) < 0.005 and float(moved[:3, 3].abs().max()) < 0.01
+    with Image.open(io.BytesIO(after.photos[2])) as picture:
+        ours = np.asarray(picture.convert("L").resize((64, 48)), float)
+    with Image.open(io.BytesIO(after.photos[1])) as picture:
+        theirs = np.asarray(picture.convert("L").resize((64, 48)), float)
+    assert np.abs(ours - theirs).mean() < 3  # JPEG's noise
+
+
+def test_a_photo_of_another_place_is_refused(run, scene, tmp_path):
+    output = tmp_path / "more.langflash"
+    outcome = run("add", scene, asset_path("photos/aloe_left.jpg"), "-o", output)
+    assert outcome.code == 2 and not output.exists()
+    assert "aloe_left.jpg could not be placed beside the scene's photos; take one" in outcome.err
+
+
+def test_a_scene_without_layers_is_refused_with_a_remedy(run, photos, tmp_path):
+    path, output = tmp_path / "plain.langflash", tmp_path / "more.langflash"
+    save(stripes(), path)
+    outcome = run("add", path, photos / "again.jpg", "-o", output)
+    assert outcome.code == 2 and not output.exists()
+    assert "keeps no layer and picture of each photo; reconstruct it again" in outcome.err
