@@ -186,17 +186,31 @@ def folder_button() -> bool:
 
 
 def slider(
-    name: str, value: float, limits: tuple[float, float], text: str, tip: str, width: float
+    label: str, value: float, limits: tuple[float, float], text: str, tip: str, width: float
 ) -> tuple[bool, float]:
-    """A slider whose value stands beside it, where the knob cannot cover it; `width` of both."""
+    """A slider between its name, of the label what is before ##, and its value, where the knob cannot cover
+    it; `width` of slider and value, to which `named` adds the name's."""
+    name = label.partition("##")[0]
+    if name:
+        imgui.align_text_to_frame_padding()
+        imgui.text_colored(theme.MUTED, name)
+        tooltip(tip)
+        imgui.same_line(0, imgui.get_style().item_inner_spacing.x)
     room = imgui.calc_text_size("0.00").x + imgui.get_style().item_inner_spacing.x
     imgui.set_next_item_width(width - room)
-    changed, moved = imgui.slider_float(name, value, *limits, "", imgui.SliderFlags_.always_clamp)
+    flags = imgui.SliderFlags_.always_clamp
+    changed, moved = imgui.slider_float(label.removeprefix(name), value, *limits, "", flags)
     tooltip(tip)
     imgui.same_line(0, imgui.get_style().item_inner_spacing.x)
     imgui.align_text_to_frame_padding()
     imgui.text_colored(theme.MUTED, text)
     return changed, moved
+
+
+def named(label: str, width: float) -> float:
+    """Pixels of a `slider` of this width with its name."""
+    name = imgui.calc_text_size(label.partition("##")[0]).x
+    return width + name + imgui.get_style().item_inner_spacing.x
 
 
 def tooltip(text: str) -> None:
