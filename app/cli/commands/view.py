@@ -13,7 +13,8 @@ def run(args: Namespace, out: TextIO) -> int:
     """Open the window on photos, a scene, or nothing; returns when it is closed.
 
     Raises:
-        ImageError: a path leads nowhere, or to a folder without photos. GraphicsError: there is no display or no OpenGL.
+        ImageError: a path leads nowhere, or to a folder without photos.
+        GraphicsError: there is no display or no OpenGL.
     """
     paths = out_of_folders(args.paths)
     for path in paths:
