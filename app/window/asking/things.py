@@ -29,4 +29,4 @@ def told(state: State) -> dict[str, int]:
 def _found(state: State, k: int) -> bool:
     """Whether the word nearest to an atom is found when asked."""
     words = state.editing.names[k] if k < len(state.editing.names) else ()
-    return words[:1] != () and words[0] in state.editing.found
+    return bool(words) and words[0] in state.editing.found

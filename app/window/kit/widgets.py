@@ -8,11 +8,13 @@ from imgui_bundle import ImVec2, ImVec4, imgui
 from imgui_bundle import icons_fontawesome_6 as fa
 
 from . import theme
+from .look import Look
 
 PLAIN = imgui.WindowFlags_.no_decoration | imgui.WindowFlags_.no_move | imgui.WindowFlags_.no_saved_settings
 NO_KEYS = imgui.WindowFlags_.no_nav  # for windows that Tab and the arrows pass by
 _Value = TypeVar("_Value")
 _FOLDER = 1.3  # of a frame's height: the icon is wider than high
+_HIGH = 760.0  # design pixels of a window
 _WIDEST = 26.0  # of a line of a tooltip, in sizes of the font
 _NEW_SECONDS, _NEW_FRAMES = 0.5, 3
 """Of what has come in the place of something else: a double click takes no longer, however slow frames are; a
@@ -239,6 +241,11 @@ def whole(text: str, tip: str) -> None:
         imgui.text_unformatted(text)
         imgui.pop_text_wrap_pos()
         imgui.end_tooltip()
+
+
+def high(look: Look) -> bool:
+    """Whether the window is so high that hints and warnings leave room for answers."""
+    return imgui.get_io().display_size.y >= look.px(_HIGH)
 
 
 def shortened(text: str, width: float) -> str:

@@ -120,6 +120,23 @@ def test_a_slider_over_the_picture_says_what_it_is(monkeypatch, changes: dict, n
         )
 
 
+def test_warnings_leave_room_for_the_answer(monkeypatch) -> None:
+    """At 900 x 560 some warnings of photos pushed "found" and "not found" out of the panel."""
+    rows, state = Rows(monkeypatch), shown_scene()
+    told = "does not meet the photos beside it; take more photos there, with more light, and hold still"
+    said = tuple(f"photo {number} {told}" for number in range(1, 5))
+    assert state.scene.info is not None
+    state = state.with_scene(info=replace(state.scene.info, warnings=said))
+    asked = state.with_asking(prompts=(replace(state.asking.prompts[0], score=0.1),))
+    with context((900, 560)):
+        theme.set_up(1.0, "dark")
+        frames(lambda seen: layout.draw_all(asked, seen), look())
+    answer = next(row for row in rows.now() if "not found" in row.words)
+    assert answer.box[3] <= answer.inside[3]
+    warned = [row.words for row in rows.now() if row.words.startswith("Photo ")]
+    assert len(warned) == 4 and all(words.endswith("...") for words in warned)
+
+
 def test_small_tools_show_their_whole_icons(monkeypatch) -> None:
     """Each was half as wide as its button's padding left."""
     seen: list[tuple[float, float]] = []

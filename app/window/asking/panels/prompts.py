@@ -15,7 +15,6 @@ from .. import lifting
 from ..state import Prompt, usable
 from . import entry, known, parts, scores
 
-_HIGH = 760.0  # design pixels of a window in which what there is to ask leaves room for answers
 _SWATCH = imgui.ColorEditFlags_.no_inputs | imgui.ColorEditFlags_.no_label | imgui.ColorEditFlags_.no_tooltip
 
 
@@ -29,7 +28,7 @@ def draw(state: State, look: Look) -> list[do.Command]:
         issued += _row(state, prompt, look)
         imgui.pop_id()
     issued += entry.tools(state, look)
-    first = not state.asking.asked or imgui.get_io().display_size.y >= look.px(_HIGH)
+    first = not state.asking.asked or widgets.high(look)
     if first:  # what there is to ask
         issued += known.draw(state, look)
     issued += scores.draw(state, look)
