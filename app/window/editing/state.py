@@ -219,7 +219,8 @@ class Editing:
     radius: of the brush, design pixels. reach: of growing, in spacings of the Gaussians.
     drag: the region being drawn, framebuffer pixels. waiting: what the worker is looking for.
     hover: what is under the pointer. asked: where a click waits for the picture to rest.
-    names: nearest words of each atom, best first. ruler: the ends of what is measured, world.
+    names: nearest words of each atom, best first; found: the best of them that are found when asked.
+    ruler: the ends of what is measured, world.
     gesture: a change of the selection that is shown and not made yet. tint: of it, while a colour is chosen.
     hiding: how the selection is to be hidden for good, while that is asked; margin: of the last time.
     recipe_path: where a clean-up's recipe was written or read last. source: of the clone brush, world; fit:
@@ -240,6 +241,7 @@ class Editing:
     asked: Point | None = None
     card: Card | None = None
     names: tuple[tuple[str, ...], ...] = ()
+    found: tuple[str, ...] = ()
     floaters: Floaters | None = None
     ruler: tuple[Spot, ...] = ()
     handle: Handle = Handle.MOVE

@@ -84,9 +84,10 @@ def draw_tint(state: State, tint: Tint, look: Look, right: float) -> list[do.Com
     flags = imgui.ColorEditFlags_.no_inputs | imgui.ColorEditFlags_.no_label
     repainted, colour = imgui.color_edit3("##tint", list(tint.colour), flags)
     widgets.tooltip("The new colour; light and shade are kept")
-    text, tip, width = f"{100 * tint.strength:.0f} %", "Strength of the colour", look.px(150)
-    widgets.go_on(width, right)
-    moved, strength = widgets.slider("##strength", tint.strength, (0.0, 1.0), text, tip, width)
+    label, text, tip = "Strength##strength", f"{100 * tint.strength:.0f} %", "Strength of the colour"
+    width = look.px(150)
+    widgets.go_on(widgets.named(label, width), right)
+    moved, strength = widgets.slider(label, tint.strength, (0.0, 1.0), text, tip, width)
     widgets.go_on(widgets.button_width("Recolour"), right, look.px(14))
     issued: list[do.Command] = []
     if repainted or moved:
