@@ -2,6 +2,7 @@
 
 import base64
 import json
+from collections.abc import Iterator
 from dataclasses import replace
 from pathlib import Path
 
@@ -69,6 +70,14 @@ def room_in_layers(num_views: int = NUM_VIEWS) -> Scene:
         view_ids=ids,
         record=Record(preset="mini", layered=True),
     )
+
+
+@pytest.fixture(scope="module", autouse=True)
+def _few_words() -> Iterator[None]:
+    """A vocabulary that takes no seconds to encode."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(pipeline, "all_phrases", lambda: PHRASES)
+        yield
 
 
 @pytest.fixture(scope="module")

@@ -9,7 +9,6 @@ import pytest
 from app.window import commands as do
 from app.window.asking import commands as ask
 from app.window.asking.state import BINS, Histogram
-from app.window.commands import apply
 from app.window.editing import commands as edit
 from app.window.editing import pointing as point
 from app.window.editing.state import RADIUS_RANGE, Floaters, Reading, Region, Tool
@@ -20,15 +19,9 @@ from app.window.state import State
 from langflash_core.base import pictures
 from langflash_core.scene.edited import edited_scene
 from langflash_core.scene.edits import Combine, Mask
-from tests.app.window.scenes import CHAIR
+from tests.app.window.scenes import CHAIR, after
 
 CHAIRS = 2500  # the first rows of the room are its block
-
-
-def after(state: State, *commands: do.Command) -> State:
-    for command in commands:
-        state = apply(state, command)
-    return state
 
 
 def rows(first: int, last: int, count: int = 12_300) -> Mask:
