@@ -43,6 +43,12 @@ def spoken_room() -> Scene:
     return room(language_space("minilm").encode(PHRASES))
 
 
+@pytest.fixture
+def few(monkeypatch) -> None:
+    """A vocabulary that takes no seconds to encode."""
+    monkeypatch.setattr(pipeline, "all_phrases", lambda: PHRASES)
+
+
 def phrases_of(scene: Scene, texts: tuple[str, ...]) -> Phrases:
     """Random scores, as if these texts had been asked."""
     rng = torch.Generator().manual_seed(0)
@@ -175,7 +181,7 @@ def test_a_page_scores_phrases_as_a_query_does(tmp_path, spoken_room):
     assert page.header["phrases"]["temperature"] == compiled.temperature
 
 
-def test_bad_questions_are_one_sentence(tmp_path, spoken_room):
+def test_bad_questions_are_one_sentence(tmp_path, spoken_room, few):
     plain = bare_scene(random_gaussians(3), "made")
     with pytest.raises(PromptError, match="no language"):
         pipeline.web_page(plain, tmp_path / "a.html", ["chair"])
@@ -186,7 +192,7 @@ def test_bad_questions_are_one_sentence(tmp_path, spoken_room):
     assert "phrases" not in read_page(tmp_path / "a.html").header
 
 
-def test_a_page_takes_the_text_model_along(tmp_path, spoken_room):
+def test_a_page_takes_the_text_model_along(tmp_path, spoken_room, few):
     pipeline.web_page(spoken_room, tmp_path / "a.html", with_text=True)
     page = read_page(tmp_path / "a.html")
     assert np.allclose(page.dictionary(), spoken_room.semantics.dictionary.numpy(), atol=1e-4)
@@ -226,7 +232,7 @@ def test_the_page_judges_by_our_numbers():
     assert {name: said[name] for name in ours} == ours
 
 
-def test_stops_and_notes_come_along(tmp_path, spoken_room):
+def test_stops_and_notes_come_along(tmp_path, spoken_room, few):
     """A stop of another lens or of parallel rays shows its subject as large."""
     wide = replace(pose_of(spoken_room), fov=90.0)
     flat = replace(pose_of(spoken_room), span=2.0, reach=5.0)
@@ -254,7 +260,7 @@ def pose_of(scene: Scene) -> Pose:
     return from_view(scene.viewmats[0].numpy(), scene.Ks[0].numpy(), scene.view_size, 1.2)
 
 
-def test_a_page_of_several_scenes_asks_all_the_same(tmp_path, spoken_room):
+def test_a_page_of_several_scenes_asks_all_the_same(tmp_path, spoken_room, few):
     fewer = spoken_room.rows(torch.arange(3000))
     pipeline.web_page(spoken_room, tmp_path / "a.html", ["lamp"], beside={"the other": fewer})
     first, second = (read_page(tmp_path / "a.html", number) for number in (0, 1))

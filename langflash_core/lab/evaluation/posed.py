@@ -8,11 +8,12 @@ Sizes: H W pixels as the network saw the photos.
 """
 
 import math
-import tempfile
 import time
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import torch
 from PIL import Image
@@ -233,19 +234,22 @@ def key_of(triple: Triple) -> str:
     return f"{triple.first}-{triple.second}"
 
 
-def relative(first: LabelledPhoto, other: LabelledPhoto) -> Tensor:
-    """World-to-camera matrix (4, 4) float64 of a photo, world = the first one's camera.
+def pose_of(photo: LabelledPhoto) -> Tensor:
+    """Camera to world (4, 4) float64.
 
     Raises:
-        InputError: one of them has no pose.
+        InputError: the photo has none.
     """
-    for photo in (first, other):
-        if photo.pose is None:
-            raise InputError(
-                f"photo {photo.id} has no line in poses.txt; add it, or take the photo out of the folder"
-            )
-    assert first.pose is not None and other.pose is not None
-    return torch.linalg.inv(other.pose.double()) @ first.pose.double()
+    if photo.pose is None:
+        raise InputError(
+            f"photo {photo.id} has no line in poses.txt; add it, or take the photo out of the folder"
+        )
+    return photo.pose.double()
+
+
+def relative(first: LabelledPhoto, other: LabelledPhoto) -> Tensor:
+    """World-to-camera matrix (4, 4) float64 of a photo, world = the first one's camera."""
+    return torch.linalg.inv(pose_of(other)) @ pose_of(first)
 
 
 def scene_of(
@@ -259,15 +263,22 @@ def scene_of(
 ) -> tuple[Scene, float]:
     """Photos through the whole program, and the seconds that took. intrinsics and what follows: as
     `reconstruct` has them."""
-    with tempfile.TemporaryDirectory() as folder:
-        paths = [Path(folder) / f"{photo.id}.png" for photo in photos]
-        for path, photo in zip(paths, photos, strict=True):
-            Image.fromarray(photo.image).save(path, "PNG", compress_level=1)
+    with files_of(photos) as paths:
         start = time.perf_counter()
         scene = reconstruct(
             paths, preset=preset, weights=weights, intrinsics=intrinsics, size=size, networks=networks
         )
         return scene, time.perf_counter() - start
+
+
+@contextmanager
+def files_of(photos: Sequence[LabelledPhoto]) -> Iterator[list[Path]]:
+    """The photos as files of one folder, which goes."""
+    with TemporaryDirectory() as folder:
+        paths = [Path(folder) / f"{photo.id}.png" for photo in photos]
+        for path, photo in zip(paths, photos, strict=True):
+            Image.fromarray(photo.image).save(path, "PNG", compress_level=1)
+        yield paths
 
 
 def as_seen(photo: LabelledPhoto, size: tuple[int, int]) -> FittedPhoto:

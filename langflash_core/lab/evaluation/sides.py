@@ -9,7 +9,7 @@ Sizes: H W pixels of the network's photos.
 """
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -59,13 +59,11 @@ def run_sides(
     size: int | None = None,
     lpips: Lpips | None = None,
     progress: Progress = lambda stage, fraction: None,
-    made: Callable[[Case, Scene], None] = lambda case, scene: None,
 ) -> dict:
     """Judge a checkpoint, and the code that runs it.
 
     Args:
         count: of the cases. render: draws a scene. size: as `reconstruct` has it. lpips: None leaves it out.
-        made: is given every scene.
 
     Returns:
         Plain JSON: "cases" with the numbers of each, "measures" and "by_look" their means.
@@ -79,7 +77,6 @@ def run_sides(
         scene, seconds = scene_of(
             case.photos, case.intrinsics, weights=weights, preset=preset, size=size, networks=networks
         )
-        made(case, scene)
         row = judge(scene, case.truth(scene.view_size), render, lpips)
         judged.append({"name": case.name, "seconds": round(seconds, 3), **row})
     if not judged:

@@ -25,15 +25,14 @@ from langflash_core.errors import InputError
 from langflash_core.lab.evaluation.alignment import aligned_camera
 from langflash_core.lab.evaluation.labelled import Render
 from langflash_core.lab.evaluation.numbers import rounded
-from langflash_core.lab.evaluation.posed import as_seen
+from langflash_core.lab.evaluation.posed import as_seen, files_of
 from langflash_core.lab.evaluation.sharp_subjects import size_of
 from langflash_core.lab.evaluation.side_measures import Similarity, as_array
 from langflash_core.lab.evaluation.sides import number
 from langflash_core.lab.evaluation.tallies import Shelf, collected
-from langflash_core.lab.evaluation.walk_aside import aside
 from langflash_core.lab.evaluation.walk_colmap import mapped
 from langflash_core.lab.evaluation.walk_measures import camera_errors, fitted_cameras, lit
-from langflash_core.lab.evaluation.walk_scenes import Bench, Made, files_of, made_of, true_cameras, with_lens
+from langflash_core.lab.evaluation.walk_scenes import Bench, Made, made_of, true_cameras, with_lens
 from langflash_core.lab.evaluation.walk_subjects import Walk
 from langflash_core.lab.photos.fitting import FittedPhoto
 from langflash_core.lab.training.measures import abs_rel, align_scale, delta1, nan_mean, psnr
@@ -112,7 +111,6 @@ def judge(
         made = made_of(walk, frames, bench, memory=bench.memory)
         once = {
             **once_of(made, bench.render),
-            **(aside(made, walk, bench) if bench.aside else {}),
             **(_colmap(made, bench) if bench.colmap else {}),
         }
         kept: dict[str, dict[str, float]] = {}

@@ -24,13 +24,9 @@ from langflash_core.errors import ImageError
 from langflash_core.scene.file import load, save
 from langflash_core.splat import render
 from langflash_core.types import Camera
-from tests.app.cli.conftest import HEIGHT, WIDTH, WORDS, stripes
+from tests.app.cli.conftest import HEIGHT, WIDTH, WORDS, pixels, stripes
 
 TORCH = ("--backend", "torch")
-
-
-def pixels(path: Path) -> np.ndarray:
-    return np.asarray(Image.open(path))
 
 
 @pytest.mark.parametrize("backend", ["torch", "gl"])

@@ -27,7 +27,7 @@ from langflash_core.geometry.harmonics import SH_C0
 from langflash_core.language.relevance import EMPTY_NORM, CompiledQuery
 from langflash_core.splat import render, view_depths
 from langflash_core.types import Camera, Frame, Gaussians, Scene, Semantics
-from tests.app.gl.questions import full_relevance, question
+from tests.app.gl.questions import draw, full_relevance, question
 from tests.splat.scenes import camera, cloud, maps_of, scene_of, splats, turned
 
 pytestmark = pytest.mark.usefixtures("queries")
@@ -39,11 +39,6 @@ CUT = 1.001 / 255
 RED, GREEN, BLUE = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 
 
-@pytest.fixture(params=["float16", "float32"])
-def precision(request):
-    return request.param
-
-
 def within(what: str, error: torch.Tensor | float, limit: float) -> None:
     """One measured error and its limit."""
     assert float(error) <= limit, f"{what}: {float(error):.2e} is above {limit:.2e}"
@@ -51,15 +46,6 @@ def within(what: str, error: torch.Tensor | float, limit: float) -> None:
 
 def largest(left: torch.Tensor, right: torch.Tensor) -> torch.Tensor:
     return (left.double() - right.double()).abs().max() if left.numel() else torch.zeros(())
-
-
-def draw(gl, precision, scene: Scene, seen: Camera, **options) -> Frame:
-    renderer = SplatRenderer(gl, precision)
-    renderer.set_scene(scene)
-    renderer.draw(seen, **options)
-    frame = renderer.frame(weight_maps=True)
-    renderer.release()
-    return frame
 
 
 class Watched:

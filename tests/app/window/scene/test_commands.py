@@ -5,7 +5,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import torch
 
 from app.window import commands as do
 from app.window.asking.commands import EditPrompt
@@ -15,24 +14,13 @@ from app.window.scene import commands as show
 from app.window.scene.drops import MAX_PHOTOS
 from app.window.scene.effects import SceneEffects
 from app.window.scene.state import FLIGHT_SECONDS
-from app.window.scene.work import describe_scene
 from app.window.state import State
 from langflash_core.geometry.poses import Pose
 from langflash_core.scene.file import save
-from tests.app.window.scenes import after, room, told
+from tests.app.window.scenes import after, told
 from tests.app.window.scenes import shown_scene as scene
 
 PATHS = tuple(Path(f"/photos/{name}.jpg") for name in "abc")
-
-
-@pytest.fixture(scope="module")
-def info():
-    return describe_scene(room(torch.eye(3)), serial=1, name="room")
-
-
-@pytest.fixture
-def shown(info) -> State:
-    return after(State(), show.SceneArrived(info))
 
 
 def test_photos_are_added_once_and_bounded() -> None:
