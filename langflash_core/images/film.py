@@ -36,8 +36,8 @@ class Film:
 
 
 class Reader:
-    """An open film; see `opened`. doubtful: pictures given so far that came equal to the last bit, as none of
-    a camera are, from the only decoder that there is: it may not know the film's kind."""
+    """An open film; see `opened`. doubtful: pictures given so far that came equal to the last bit, as none
+    of a camera are, from the only decoder that there is: it may not know the film's kind."""
 
     def __init__(self, path: Path, film: Film) -> None:
         self._path, self.film, self.doubtful = path, film, 0

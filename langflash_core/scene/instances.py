@@ -55,7 +55,7 @@ def things(scene: Scene, members: Bool[np.ndarray, " N"]) -> Integer[np.ndarray,
 def parts_of(
     scene: Scene, members: Bool[np.ndarray, " N"]
 ) -> tuple[Integer[np.ndarray, " N"], Float[np.ndarray, " N"]]:
-    """`connected` of a scene; of one of layers, what several of them show has one number, as in `things`."""
+    """`connected` of a scene; what several layers show has one number, as in `things`."""
     parts, radii = connected(scene.gaussians, members)
     if scene.layered and parts.max(initial=-1) > 0:
         parts = _as_one(scene, parts, radii)

@@ -176,7 +176,7 @@ class Floaters:
         return self.recipe != Recipe(self.strength)
 
     def mask(self, visible: Mask) -> Mask:
-        """Gaussians that go, of what is shown; as `langflash_core.mending.cleaning.cleaned` finds them."""
+        """Gaussians that go, of what is shown, by `langflash_core.mending.cleaning.cleaned`."""
         found = Mask.none(visible.count)
         if not self.least or self.recipe.empty:
             return found
