@@ -47,7 +47,8 @@ from langflash_core.export.page_columns import (
 from langflash_core.export.png import DIM, GLOW
 from langflash_core.geometry.cameras import invert_rigid
 from langflash_core.geometry.poses import from_view
-from langflash_core.scene.exposure import FAR, HERE, median_distance
+from langflash_core.scene.exposure import median_distance
+from langflash_core.scene.settings import EXPOSURE
 from langflash_core.scene.tour import Stop, read_tour
 from langflash_core.scene.world import turn_of
 from langflash_core.types import Scene
@@ -269,7 +270,7 @@ def _views(scene: Scene, origin: Tensor) -> list[dict]:
 def _light(scene: Scene) -> dict:
     """What the light of a place is found by (`scene.exposure`); nothing of photos in one light."""
     light = scene.record.light
-    told = {**light, "distance": median_distance(scene), "far": FAR, "here": HERE}
+    told = {**light, "distance": median_distance(scene), "far": EXPOSURE.far, "here": EXPOSURE.here}
     return {"light": told} if light else {}
 
 

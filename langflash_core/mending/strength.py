@@ -24,8 +24,9 @@ from scipy.spatial import KDTree
 from langflash_core.errors import InputError
 from langflash_core.geometry.cameras import invert_rigid
 from langflash_core.geometry.quaternions import quats_to_matrices
-from langflash_core.scene.instances import LINK, connected
+from langflash_core.scene.instances import connected
 from langflash_core.scene.selection import isolation
+from langflash_core.scene.settings import INSTANCES
 from langflash_core.scene.thin import covered_areas
 from langflash_core.types import Scene
 
@@ -114,7 +115,7 @@ def _crumbs(scene: Scene, visible: Bool[np.ndarray, " N"]) -> Float[np.ndarray, 
         return scores
     means = scene.gaussians.means.detach().cpu().double().numpy()
     distance, which = KDTree(means[rest]).query(means[small])
-    reach = _APART * LINK * (radii[small] + radii[rest][which]) / 2
+    reach = _APART * INSTANCES.link * (radii[small] + radii[rest][which]) / 2
     nearest = np.full(len(surfaces), np.inf)
     np.minimum.at(nearest, parts[small], distance / reach)  # the nearest of a part speaks for all of it
     shares = surfaces[parts[small]] / surfaces.sum()
