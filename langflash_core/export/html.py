@@ -44,7 +44,7 @@ from langflash_core.export.page_columns import (
     table_column,
     weight_columns,
 )
-from langflash_core.export.png import DIM, GLOW
+from langflash_core.export.settings import PAINTING
 from langflash_core.geometry.cameras import invert_rigid
 from langflash_core.geometry.poses import from_view
 from langflash_core.scene.exposure import median_distance
@@ -205,7 +205,12 @@ def _json_script(name: str, content: dict) -> str:
 def _constants() -> dict[str, str]:
     """What `show.frag` is given, as GLSL."""
     stops = ", ".join("vec3({})".format(", ".join(f"{part:.3f}" for part in stop)) for stop in HEAT_STOPS)
-    return {"GLOW": str(GLOW), "DIM": str(DIM), "STOPS": str(len(HEAT_STOPS)), "HEAT_STOPS": stops}
+    return {
+        "GLOW": str(PAINTING.glow),
+        "DIM": str(PAINTING.dim),
+        "STOPS": str(len(HEAT_STOPS)),
+        "HEAT_STOPS": stops,
+    }
 
 
 def _encoded(scene: Scene, phrases: Phrases | None) -> tuple[dict, bytes]:

@@ -14,7 +14,7 @@ from langflash_core.base.resources import asset_path
 from langflash_core.errors import InputError, OutputError, PromptError
 from langflash_core.export import export
 from langflash_core.export.html import LAYERED, READING, SCRIPTS, Phrases, write_html
-from langflash_core.export.page_columns import MOST_WEIGHTS
+from langflash_core.export.settings import COLUMNS
 from langflash_core.geometry.poses import Pose, Vector, from_view
 from langflash_core.language.answers import COVERED_ALPHA, MIN_AREA, TOP_FRACTION
 from langflash_core.language.relevance import EMPTY_NORM, compile_query
@@ -157,7 +157,7 @@ def test_only_the_largest_weights_are_kept(tmp_path):
     scene = cloud(40, num_atoms=9, kept=8, degree=0, dtype=torch.float32)
     write_html(scene, tmp_path / "a.html", phrases=phrases_of(scene, ("one",)))
     found = read_page(tmp_path / "a.html").dense_weights()
-    assert ((found > 0).sum(1) <= MOST_WEIGHTS).all() and np.allclose(found.sum(1), 1)
+    assert ((found > 0).sum(1) <= COLUMNS.most_weights).all() and np.allclose(found.sum(1), 1)
 
 
 def test_a_page_scores_phrases_as_a_query_does(tmp_path, spoken_room):
