@@ -21,7 +21,7 @@ from langflash_core.base.picture_files import STORED, opened_picture
 from langflash_core.errors import InputError
 from langflash_core.geometry.cameras import invert_rigid
 from langflash_core.inventory.things import Inventory
-from langflash_core.language.answers import COVERED_ALPHA
+from langflash_core.language.settings import ANSWERING
 from langflash_core.scene.world import turn_of
 from langflash_core.types import Camera, Frame
 
@@ -112,7 +112,7 @@ def _world_places(
     columns, rows = pixels.astype(int).T
     columns, rows = columns.clip(0, camera.width - 1), rows.clip(0, camera.height - 1)
     depths = frame.depths.cpu().double().numpy()[rows, columns]
-    covered = frame.alphas.cpu().numpy()[rows, columns] >= COVERED_ALPHA
+    covered = frame.alphas.cpu().numpy()[rows, columns] >= ANSWERING.covered_alpha
     rays = np.concatenate((pixels, np.ones((len(pixels), 1))), 1) @ np.linalg.inv(camera.K.double().numpy()).T
     pose = invert_rigid(camera.viewmat.double()).cpu().numpy()
     points = (rays * depths[:, None]) @ pose[:3, :3].T + pose[:3, 3]

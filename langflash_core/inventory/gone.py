@@ -20,7 +20,7 @@ from scipy.sparse.csgraph import connected_components
 from langflash_core.geometry.harmonics import SH_C0
 from langflash_core.inventory.alignment import Fit, Render
 from langflash_core.inventory.things import Inventory
-from langflash_core.language.answers import COVERED_ALPHA
+from langflash_core.language.settings import ANSWERING
 from langflash_core.scene.instances import touching
 from langflash_core.scene.world import turn_of
 from langflash_core.types import Camera, Scene, Semantics
@@ -119,7 +119,7 @@ def _sight(
     frame = render(scene, camera)
     assert frame.weight_maps is not None, "render draws weight maps unless told otherwise"
     columns, rows, depth, inside = _pixels(camera, points)
-    met = inside & (frame.alphas.cpu().numpy()[rows, columns] >= COVERED_ALPHA)
+    met = inside & (frame.alphas.cpu().numpy()[rows, columns] >= ANSWERING.covered_alpha)
     chosen, cosines = np.flatnonzero(met), np.zeros(len(points))
     maps = frame.weight_maps.cpu().numpy()[rows[chosen], columns[chosen]].astype(float)
     ids = own.weight_ids.numpy()[chosen]

@@ -26,9 +26,9 @@ from langflash_core.errors import InputError
 from langflash_core.export import opened
 from langflash_core.inventory.apart import DEEPEST, taken_apart
 from langflash_core.inventory.pieces import STRUCTURE, Parts, parts_of_room
-from langflash_core.language.answers import BOX_QUANTILES
 from langflash_core.language.gaussians import gaussian_relevance
 from langflash_core.language.relevance import compile_query
+from langflash_core.language.settings import ANSWERING
 from langflash_core.language.spaces import language_space
 from langflash_core.language.vocabulary import OWN
 from langflash_core.level import found_world, metres_of
@@ -333,12 +333,12 @@ def upright_box(
 
     Extents are from the 2nd to the 98th of a hundred points.
     """
-    heights = np.quantile(-points[:, 1], BOX_QUANTILES)
+    heights = np.quantile(-points[:, 1], ANSWERING.box_quantiles)
     flat = points[:, [0, 2]]
     options = []
     for turn in _TURNS:
         axes = np.array([[math.cos(turn), math.sin(turn)], [-math.sin(turn), math.cos(turn)]])
-        low, high = np.quantile(flat @ axes.T, BOX_QUANTILES, axis=0)
+        low, high = np.quantile(flat @ axes.T, ANSWERING.box_quantiles, axis=0)
         options.append((float(np.prod(high - low + 0.02 * (high - low).max())), axes, low, high))
     best = min(range(len(options)), key=lambda k: options[k][0])
     if options[best][0] > (1 - _SAVES) * options[0][0]:

@@ -25,7 +25,7 @@ from langflash_core.lab.evaluation.walk_subjects import Walk
 from langflash_core.lab.photos import LabelledPhoto
 from langflash_core.lab.photos.fitting import FittedPhoto
 from langflash_core.lab.training.measures import abs_rel, psnr
-from langflash_core.language.answers import COVERED_ALPHA
+from langflash_core.language.settings import ANSWERING
 from langflash_core.rig.projected import project_points
 from langflash_core.scene.gaps import filled
 from langflash_core.types import Camera
@@ -102,7 +102,7 @@ def _judged(
     start = Camera(torch.from_numpy(made.fit.viewmat(viewmat)).float(), photo.K, *scene.view_size)
     camera = aligned_camera(lambda at: bench.render(scene, at), start, truth)
     frame = bench.render(scene, camera)
-    covered = frame.alphas.cpu() >= COVERED_ALPHA
+    covered = frame.alphas.cpu() >= ANSWERING.covered_alpha
     rgb = filled(frame.rgb.cpu().float(), frame.alphas.cpu().float()).clamp(0, 1)
     drawn = frame.depths.cpu().float() * made.fit.scale
     rows = []
