@@ -3,7 +3,7 @@
 from imgui_bundle import ImVec2, imgui
 from imgui_bundle import icons_fontawesome_6 as fa
 
-from langflash_core.mending.recipes import MOST_MARGIN
+from langflash_core.mending.settings import RECIPE_DEFAULTS
 from langflash_core.scene.edits import Combine
 
 from ... import commands as do
@@ -360,12 +360,15 @@ def _margin(state: State, asked: Hiding, look: Look, right: float) -> list[do.Co
     """How much around the selection is hidden with it, and how many Gaussians that are."""
     tip = "Margin: how much around it is hidden too, as a share of a photo's longer side"
     name, text = "Margin", f"{100 * asked.margin:.1f} %"
-    beside = imgui.calc_text_size(f"{name}{100 * MOST_MARGIN:.1f} %").x + 2 * imgui.get_style().item_spacing.x
+    beside = (
+        imgui.calc_text_size(f"{name}{100 * RECIPE_DEFAULTS.most_margin:.1f} %").x
+        + 2 * imgui.get_style().item_spacing.x
+    )
     widgets.go_on(look.px(_MARGIN_SLIDER) + beside, right, look.px(14))
     imgui.align_text_to_frame_padding()
     imgui.text(name)
     imgui.same_line()
-    limits = (0.0, MOST_MARGIN)
+    limits = (0.0, RECIPE_DEFAULTS.most_margin)
     changed, margin = widgets.slider("##margin", asked.margin, limits, text, tip, look.px(_MARGIN_SLIDER))
     found = None if state.editing.marks is None else asked.mask(state.editing.marks)
     words = "looking ..." if found is None else f"{len(found):,} in all"
