@@ -233,7 +233,8 @@ def _encoded(gaussians: Gaussians, block: bytes) -> Iterator[bytes]:
     matrix = axes_matrix(_AXES)
     rows = [turned(part, matrix) for part in parts(gaussians)]
     columns: list[tuple[str, str, int]] = [
-        ("POSITION", "VEC3", GLTF_CODES.float), ("COLOR_0", "VEC4", GLTF_CODES.ushort), (_NAMES["ROTATION"], "VEC4", GLTF_CODES.float),
+        ("POSITION", "VEC3", GLTF_CODES.float), ("COLOR_0", "VEC4", GLTF_CODES.ushort),
+        (_NAMES["ROTATION"], "VEC4", GLTF_CODES.float),
         (_NAMES["SCALE"], "VEC3", GLTF_CODES.float), (_NAMES["OPACITY"], "SCALAR", GLTF_CODES.float),
         *((name, "VEC3", GLTF_CODES.float) for name in _harmonics(num_bases)),
     ]  # fmt: skip

@@ -89,8 +89,8 @@ def _sections(headers: bytes, room: int, level: int, size: int, name: str) -> li
         values = _PART.unpack_from(headers, index * BUCKETS.section)
         count, most, capacity, buckets, side, bucket_bytes, steps, full, partial, degree = values
         section = _Section(
-            count, most, capacity, buckets, side, bucket_bytes, steps or BUCKETS.steps[level], full, partial, degree,
-            start,
+            count, most, capacity, buckets, side, bucket_bytes,
+            steps or BUCKETS.steps[level], full, partial, degree, start,
         )  # fmt: skip
         if degree > 3:
             raise SceneFileError(

@@ -308,7 +308,8 @@ def _bent(view: _View, missing: Bool[np.ndarray, "H W"], sofar: Scene, render: R
     carried = None if view.weights is None else view.weights[nearest[0][missing], nearest[1][missing]]
     return _elements(
         none, transform(pose, points[rows]).numpy(), (pose[:3, :3] @ axes[rows]).numpy(),
-        FILLING.cover * sizes[rows].clamp_min(1e-6).numpy(), spread(straight, known)[missing], carried, view.number,
+        FILLING.cover * sizes[rows].clamp_min(1e-6).numpy(), spread(straight, known)[missing],
+        carried, view.number,
     )  # fmt: skip
 
 

@@ -220,8 +220,8 @@ def test_the_page_judges_by_our_numbers():
     text = "".join((PAGE / name).read_text(encoding="utf-8") for name in ("answers.js", "sorting.js"))
     said = {name: float(value) for name, value in re.findall(r"const (\w+) = ([\d.e-]+);", text)}
     ours = {
-        "EMPTY_NORM": RELEVANCE.empty_norm, "COVERED_ALPHA": ANSWERING.covered_alpha, "TOP_FRACTION": ANSWERING.top_fraction,
-        "MIN_AREA": ANSWERING.min_area, "NEAR": NEAR,
+        "EMPTY_NORM": RELEVANCE.empty_norm, "COVERED_ALPHA": ANSWERING.covered_alpha,
+        "TOP_FRACTION": ANSWERING.top_fraction, "MIN_AREA": ANSWERING.min_area, "NEAR": NEAR,
     }  # fmt: skip
     assert {name: said[name] for name in ours} == ours
 
