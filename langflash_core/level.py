@@ -52,7 +52,7 @@ class Levelling:
     no_floor: float = 0.1
     """Of scenes, whose floor is a table top or the like: 8 of 100 held-out rooms, by their cameras."""
     table: float = 1.2
-    """M, at most so far."""
+    """Metres, at most so far."""
     another: float = 1e-3
     """Odds that such a thing is another than it is called, to those of its exact height."""
     wide: float = 1.5
@@ -62,8 +62,8 @@ class Levelling:
     edge: float = 0.02
     """Of a picture's side: what reaches so near to its border may go on."""
     ceiling: tuple[float, float] = (2.6, 0.09)
-    """M, and the standard deviation of its logarithm, of homes: minima of building codes are 2.3 to 2.5 m,
-    and few ceilings are above 2.9 m. The deviations, also those below, hold what the scene's own heights
+    """Metres, and the standard deviation of its logarithm, of homes: minima of building codes are 2.3 to 2.5
+    m, and few ceilings are above 2.9 m. The deviations, also those below, hold what the scene's own heights
     are off by."""
     door: tuple[float, float] = (2.03, 0.07)
     """The same of door leaves: 1.98 (UK), 2.01 (DIN), 2.03 (US), 2.10 m."""

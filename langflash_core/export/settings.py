@@ -164,7 +164,7 @@ class PlyNumbers:
     """Numbers of .ply files that others wrote (`export.ply_numbers`)."""
 
     thin: float = 1e-6
-    """Of the third axis of flat Gaussians."""
+    """Scale of the third axis of flat Gaussians."""
     norms: tuple[float, float] = (1 / 16, 16.0)
     """Of quaternions as trainers leave them; whole numbers read as halves are all over."""
     most: float = 0.9

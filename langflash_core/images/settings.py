@@ -74,7 +74,7 @@ class LensPrior:
     plausible_fov: tuple[float, float] = (5.0, 150.0)
     """Degrees; EXIF that says otherwise is wrong."""
     film_diagonal: float = math.hypot(36.0, 24.0)
-    """Mm, of the film that focal lengths are compared by."""
+    """Millimetres, of the film that focal lengths are compared by."""
     assumed_doubt: float = 0.35
     """Standard deviation of the logarithm of an assumed focal length: a wide lens is at -.6, twice the
     zoom at +.7."""

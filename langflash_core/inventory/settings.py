@@ -20,7 +20,7 @@ class Alignment:
     scales: tuple[float, float] = (1.6, 2.5)
     """Up to which scenes in metres and others may differ; guessed ones too, if need be."""
     near: float = 0.12
-    """M: how well they agree."""
+    """Metres within which matches agree."""
     tries: int = 4000
     """Pairs of matches that say a transform."""
 
@@ -35,11 +35,11 @@ class Beside:
     stays: float = 0.35
     """Share of a thing's width by which it may seem to move, and stayed; at least `still`."""
     still: float = 0.12
-    """M."""
+    """Metres by which a thing may seem to move, and stayed: what depth and poses err."""
     alike: float = 0.6
     """Share by which widths and heights of one thing may differ between two scenes."""
     flat: float = 0.12
-    """M: what is thinner hangs on a wall or lies on the floor, and is no reason to doubt."""
+    """Metres: what is thinner cannot be told from what is behind it."""
     known: float = 0.3
     """Of a thing's surface: so much has to be seen in the other scene,"""
     gone: float = 0.5
@@ -52,9 +52,9 @@ class Beside:
     """Affinity of looks from which two things may be one: the same one in two scenes has 1.3 to 1.9,
     others up to 1.5 (8 rooms beyond those judged)."""
     looks: float = 2.0
-    """M of way, that an affinity lower by 1 weighs as much as."""
+    """Metres of way, as which an affinity lower by 1 weighs."""
     touching: float = 0.1
-    """M between things that touch."""
+    """Metres between things that touch."""
 
 
 BESIDE = Beside()
@@ -65,7 +65,7 @@ class Gone:
     """What is there no more (`inventory.gone`)."""
 
     behind: tuple[float, float] = (0.03, 0.02)
-    """M, and share of depth: how far behind a surface something else has to be seen. Fits are good to 3
+    """Metres, and share of depth: how far behind a surface something else has to be seen. Fits are good to 3
     cm."""
     there: tuple[float, float] = (0.08, 0.05)
     """The same, by which a surface may be off that is still there."""
@@ -106,27 +106,27 @@ class FloorPlan:
     """Walls of a room 4 m across (`inventory.plan`); all lengths are scaled where the unit is no metre."""
 
     bin: float = 0.03
-    """Of a room 4 m across; all are scaled where the unit is no metre. m of offset."""
+    """Metres of offset, of the histogram in which walls are peaks."""
     blur: float = 0.07
-    """M, of the histogram."""
+    """Metres, standard deviation by which that histogram is smoothed."""
     thick: float = 0.15
-    """M from a wall's plane, of what belongs to it."""
+    """Metres from a wall's plane, of what belongs to it."""
     apart: float = 0.30
-    """M between two walls side by side."""
+    """Metres between two walls side by side."""
     step: float = 0.10
-    """M along a wall, in which it is looked for."""
+    """Metres along a wall, in which it is looked for."""
     gap: float = 1.2
-    """M along a wall without any of it, from which on it is two."""
+    """Metres along a wall without any of it, from which on it is two."""
     shortest: float = 0.5
-    """M of a wall."""
+    """Metres of a wall."""
     meets: float = 0.6
-    """M by which a wall is lengthened to the wall that it meets."""
+    """Metres by which a wall is lengthened to the wall that it meets."""
     least: float = 0.03
-    """Of the weight of all walls."""
+    """Of the weight of all walls, from which a peak is one."""
     nearest: float = 0.5
-    """M from a photo: what is nearer weighs no more."""
+    """Metres from a photo: what is nearer weighs no more."""
     beside: float = 0.75
-    """M from a larger wall along the same piece of floor: what is there stands before it."""
+    """Metres from a larger wall along the same piece of floor: what is there stands before it."""
     low: float = 0.6
     """Of the height that walls are seen to: what ends below is furniture."""
     upright: float = math.sin(math.radians(35))
@@ -134,15 +134,15 @@ class FloorPlan:
     faces: float = math.cos(math.radians(40))
     """Cosine of a normal with an axis of the room that it faces along."""
     long: float = 1.2
-    """M: of 61 longer walls of 14 held-out rooms 53 are true ones, of 23 shorter ones 11."""
+    """Metres: of 61 longer walls of 14 held-out rooms 53 are true ones, of 23 shorter ones 11."""
     few: float = 0.1
-    """Of the weight of all walls: what is less, and."""
+    """Of the weight of all walls: what is less, and"""
     down: float = 0.3
-    """ends higher than so many m over the floor, is doubted."""
+    """ends higher than so many metres over the floor, is doubted."""
     across: float = 0.3
-    """M on either side of a wall, beyond what depth errs: what lies on both goes through it."""
+    """Metres on either side of a wall, beyond what depth errs: what lies on both goes through it."""
     hangs: float = 0.45
-    """M from a wall, of a door or window in it."""
+    """Metres from a wall, of a door or window in it."""
 
 
 FLOOR_PLAN = FloorPlan()
@@ -155,9 +155,9 @@ class Listing:
     least_share: float = 0.003
     """Of a photo: what no photo shows so large is no thing of an inventory."""
     least_size: float = 0.05
-    """M, of the second of a thing's three extents: what is smaller is a crumb or a line."""
+    """Metres, of the second of a thing's three extents: what is smaller is a crumb or a line."""
     over: float = 0.1
-    """M over the ceiling, from which on nothing stands in the room: depth there errs with its height."""
+    """Metres over the ceiling, from which on nothing stands in the room: depth there errs with its height."""
     seen: float = 0.0005
     """Of a photo that shows a thing."""
     saves: float = 0.12

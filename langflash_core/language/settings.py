@@ -11,7 +11,7 @@ class Answering:
     covered_alpha: float = 0.5
     """A pixel shows the scene, rather than the background, from here on."""
     peak: float = 0.01
-    """Of relevance."""
+    """Of relevance, within which pixels are as relevant as the best."""
     top_fraction: float = 0.001
     """Of the covered pixels: their mean is the score, so no stray pixel decides."""
     min_area: float = 0.0005

@@ -53,17 +53,17 @@ class Coarsening:
     """Parts made unrecognisable (`mending.coarse`)."""
 
     levels: int = 16
-    """Of a colour."""
+    """Of each channel of a colour: so few tell no pattern."""
     opacity: float = 0.99
     """Of the Gaussians of blocks."""
     places: int = 8
-    """That a block's side is parted into."""
+    """Places along a block's side, for which it is parted."""
     cover: float = 0.85
     """Deviation of a Gaussian over its spacing: closed (surface/elements.py)."""
     thin: float = 0.1
     """Thickness of theirs over their width."""
     tiles: int = 6
-    """Along the side of a block."""
+    """Gaussians along the side of a block."""
     around: int = 8
     """Blocks that run into each other."""
 
@@ -86,7 +86,7 @@ class Filling:
     most_side: int = 512
     """Pixels of the longer side of that."""
     most_views: int = 12
-    """With the largest holes."""
+    """Views that are filled, those with the largest holes."""
     least: int = 12
     """Pixels of a hole."""
     ring: float = 0.08
@@ -104,7 +104,7 @@ class Filling:
     through: float = 1.05
     """Times as deep: there another view sees through."""
     cell: float = 1.4
-    """Pixels of a view."""
+    """Pixels of a view from one Gaussian that fills to the next."""
     most_cells: int = 150_000
     """Of a plane's grid."""
     behind: float = 0.3
@@ -156,7 +156,7 @@ class Preview:
     least: float = 1 / 255
     """Of a pixel that is covered."""
     most_views: int = 4
-    """In a picture of before and after."""
+    """Views in a picture of before and after."""
 
 
 PREVIEW = Preview()
@@ -216,7 +216,7 @@ class Crumbs:
     """How strongly crumbs are cleaned (`mending.strength`)."""
 
     apart: float = 3.0
-    """Times LINK: what is nearer to the rest is no crumb, but a part of its surface."""
+    """Times `INSTANCES.link`: what is nearer to the rest is no crumb, but a part of its surface."""
     fewest: int = 16
     """Gaussians of which it can be said what is usual."""
 

@@ -46,23 +46,23 @@ class Paper:
     scales: tuple[int, ...] = (10, 20, 25, 50, 100, 200, 500)
     """1 to so many, on paper."""
     room: tuple[float, float] = (118.0, 150.0)
-    """Mm, width and height for the drawing itself: with its list it fits on A4."""
+    """Millimetres, width and height for the drawing itself: with its list it fits on A4."""
     edge: float = 14.0
-    """Mm around the drawing."""
+    """Millimetres around the drawing."""
     top: float = 20.0
-    """Mm above it."""
+    """Millimetres above it."""
     list: float = 62.0
-    """Mm for the list."""
+    """Millimetres for the list."""
     row: float = 7.4
-    """Mm of the list."""
+    """Millimetres of the list."""
     wall: float = 1.5
-    """Mm of lines of walls."""
+    """Millimetres of lines of walls."""
     thin: float = 0.25
-    """Mm of other lines."""
+    """Millimetres of other lines."""
     hangs: float = 0.7
     """Of the height of its top, from which its lower end is over what stands below."""
     badge: float = 1.9
-    """Mm, radius of a number's circle."""
+    """Millimetres, radius of a number's circle."""
 
 
 PAPER = Paper()
