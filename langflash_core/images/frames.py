@@ -444,7 +444,7 @@ def _share_a_room(marks: dict[int, Marks], one: list[int], other: list[int]) -> 
 
 def _some(indices: list[int]) -> list[int]:
     """Some of them, ends included."""
-    places = np.unique(np.round(np.linspace(0, len(indices) - 1, STILLS.compared)).astype(int))
+    places = np.unique(np.round(np.linspace(0, len(indices) - 1, STILLS.compared_stills)).astype(int))
     return [indices[place] for place in places]
 
 

@@ -58,7 +58,7 @@ class Stills:
     """Of the side, that the film is taken to have moved where it was lost in a fast turn."""
     most_shots: int = 12
     """Shots that are compared with each other."""
-    compared: int = 3
+    compared_stills: int = 3
     """Stills of a shot that are compared with those of others."""
 
 

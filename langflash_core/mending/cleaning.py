@@ -103,7 +103,7 @@ def meeting(
     """Gaussians of which all conditions of a rule hold.
 
     Args:
-        measure: `measured` of the scene by name, where they are remembered; None: it is measured here.
+        measure: `measured` of the scene by name, where they are remembered; None: measured here.
 
     Raises:
         InputError: the scene does not know what a condition asks for.
