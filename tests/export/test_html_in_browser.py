@@ -19,7 +19,7 @@ from langflash_core import pipeline
 from langflash_core.export.html import write_html
 from langflash_core.export.png import heat_over
 from langflash_core.language.algebra import encode_prompts
-from langflash_core.language.answers import COVERED_ALPHA
+from langflash_core.language.settings import ANSWERING
 from langflash_core.language.spaces import language_space
 from langflash_core.scene.bare import bare_scene
 from langflash_core.scene.exposure import lit_camera
@@ -93,7 +93,7 @@ def check_answer(page: Browser, ours: QueryResult, view: int) -> None:
     assert theirs.score == pytest.approx(answer.score, abs=0.01)
     if answer.found:
         assert theirs.relevance is not None
-        mask = (theirs.relevance >= answer.threshold) & (theirs.alpha >= COVERED_ALPHA)
+        mask = (theirs.relevance >= answer.threshold) & (theirs.alpha >= ANSWERING.covered_alpha)
         expected = ours.masks[0].numpy()
         assert (mask & expected).sum() / (mask | expected).sum() >= LEAST_IOU
 

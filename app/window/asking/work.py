@@ -142,9 +142,9 @@ class Answer(SceneTask):
 
     def histograms(self, relevance: "Tensor") -> tuple[Histogram, ...]:
         """How many covered pixels of the view score how high, by phrase."""
-        from langflash_core.language.answers import COVERED_ALPHA
+        from langflash_core.language.settings import ANSWERING
 
-        covered = self.frame.alphas >= COVERED_ALPHA
+        covered = self.frame.alphas >= ANSWERING.covered_alpha
         made = []
         for key, text, own in zip(self.keys, self.query.texts, relevance, strict=True):
             counts, _ = np.histogram(own[covered].numpy(), BINS, (0.0, 1.0))

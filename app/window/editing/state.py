@@ -7,7 +7,8 @@ from pathlib import Path
 import numpy as np
 
 from langflash_core.geometry.poses import Pose
-from langflash_core.mending.recipes import MARGIN, STRENGTH, Box, Recipe
+from langflash_core.mending.recipes import Box, Recipe
+from langflash_core.mending.settings import RECIPE_DEFAULTS
 from langflash_core.scene.changes import Change
 from langflash_core.scene.edits import Combine, History, Marks
 from langflash_core.scene.mask import Mask
@@ -17,7 +18,7 @@ PICK_RADIUS = 4.0
 REACH_RANGE = (1.0, 12.0)
 TOP_ATOMS = 3
 RECIPE_SUFFIX = ".recipe.json"
-BY_STRENGTH = Recipe(STRENGTH)
+BY_STRENGTH = Recipe(RECIPE_DEFAULTS.strength)
 
 
 class Tool(Enum):
@@ -176,7 +177,7 @@ class Floaters:
         return self.recipe != Recipe(self.strength)
 
     def mask(self, visible: Mask) -> Mask:
-        """Gaussians that go, of what is shown; as `langflash_core.mending.cleaning.cleaned` finds them."""
+        """Gaussians that go, of what is shown, by `langflash_core.mending.cleaning.cleaned`."""
         found = Mask.none(visible.count)
         if not self.least or self.recipe.empty:
             return found
@@ -199,7 +200,7 @@ class Hiding:
     """
 
     how: str
-    margin: float = MARGIN
+    margin: float = RECIPE_DEFAULTS.margin
     least: bytes = field(default=b"", repr=False)
     of: Marks | None = field(default=None, repr=False)
 
@@ -248,7 +249,7 @@ class Editing:
     gesture: Change | None = None
     tint: Tint | None = None
     hiding: Hiding | None = None
-    margin: float = MARGIN
+    margin: float = RECIPE_DEFAULTS.margin
     last_tint: Tint = Tint()
     recipe_path: Path | None = None
     source: Spot | None = None

@@ -36,7 +36,7 @@ from langflash_core.lab.photos.fitting import FittedPhoto, fitted
 from langflash_core.lab.photos.folder import lenses_of
 from langflash_core.lab.training.losses import ssim_map
 from langflash_core.lab.training.measures import abs_rel, align_scale, delta1, nan_mean, psnr
-from langflash_core.language.answers import COVERED_ALPHA
+from langflash_core.language.settings import ANSWERING
 from langflash_core.pipeline import reconstruct
 from langflash_core.reconstruction.networks import Networks
 from langflash_core.scene.bare import bare_scene
@@ -220,7 +220,7 @@ def _sight(triple: Triple, first: FittedPhoto, target: FittedPhoto, frame: Frame
         "first photo": photo_picture(start),
         "photo between": photo_picture(truth),
         "drawn": photo_picture(frame.rgb),
-        "error": error_picture(frame.rgb, truth, (frame.alphas >= COVERED_ALPHA).numpy()),
+        "error": error_picture(frame.rgb, truth, (frame.alphas >= ANSWERING.covered_alpha).numpy()),
     }
     known = {name: values[-1] for name, values in tally.numbers.items()}
     numbers = {name: known[name] for name in ("psnr", "covered", "depth_abs_rel") if name in known}
@@ -292,7 +292,7 @@ def judge_depth(frames: Sequence[Frame], truths: Sequence[FittedPhoto], tally: T
     (NaN: not known)."""
     scale = math.nan
     for view, (frame, truth) in enumerate(zip(frames, truths, strict=True)):
-        depths = torch.where(frame.alphas >= COVERED_ALPHA, truth.depths, 0.0)
+        depths = torch.where(frame.alphas >= ANSWERING.covered_alpha, truth.depths, 0.0)
         valid = (depths > 0) & (frame.depths > 0)
         if not bool(valid.any()):
             continue
@@ -322,7 +322,7 @@ def judge_aligned(
     truth = photo.rgb.permute(1, 2, 0).float() / 255
     plain = bare_scene(scene.gaussians, "colours")  # no weight maps are drawn
     frame = render(plain, aligned_camera(lambda at: render(plain, at), camera, truth))
-    shown = frame.alphas >= COVERED_ALPHA
+    shown = frame.alphas >= ANSWERING.covered_alpha
     tally.note(psnr_whole_picture_aligned=psnr(frame.rgb, truth))
     if bool(shown.any()):
         tally.note(psnr_aligned=psnr(frame.rgb[shown], truth[shown]))
@@ -336,7 +336,7 @@ def judge_picture(
     """The scene from where a photo was taken that it was not made of; pixels that the scene covers, and all
     of them."""
     truth, start = (p.rgb.permute(1, 2, 0).float() / 255 for p in (photo, first))
-    shown = frame.alphas >= COVERED_ALPHA
+    shown = frame.alphas >= ANSWERING.covered_alpha
     tally.note(
         covered=float(shown.float().mean()),
         psnr_whole_picture=psnr(frame.rgb, truth),

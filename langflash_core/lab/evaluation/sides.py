@@ -40,7 +40,7 @@ from langflash_core.lab.evaluation.side_measures import (
 from langflash_core.lab.evaluation.side_subjects import Case, Look, Subject
 from langflash_core.lab.training.losses import ssim_map
 from langflash_core.lab.training.measures import nan_mean, psnr
-from langflash_core.language.answers import COVERED_ALPHA
+from langflash_core.language.settings import ANSWERING
 from langflash_core.reconstruction.networks import Networks
 from langflash_core.scene.gaps import filled
 from langflash_core.types import Camera, Frame, Scene
@@ -133,7 +133,9 @@ def judge(scene: Scene, subject: Subject, render: Render, lpips: Lpips | None = 
 
 def covered_depths(frame: Frame) -> np.ndarray:
     """Drawn depths (H, W), scene units; 0 where the scene covers less than half."""
-    return as_array(torch.where(frame.alphas >= COVERED_ALPHA, frame.depths, torch.zeros_like(frame.depths)))
+    return as_array(
+        torch.where(frame.alphas >= ANSWERING.covered_alpha, frame.depths, torch.zeros_like(frame.depths))
+    )
 
 
 def aligned(scene: Scene, placed: Sequence[Look], drawn: Sequence[np.ndarray]) -> Similarity:

@@ -10,7 +10,7 @@ from langflash_core.base.resources import asset_path
 from langflash_core.export import export, read
 from langflash_core.export.cameras import read_posed
 from langflash_core.export.language import side_car
-from langflash_core.lift import VIEWS
+from langflash_core.lift import LIFTING
 from tests.app.cli.conftest import stripes
 
 TORCH = ("--backend", "torch")
@@ -77,7 +77,7 @@ def test_a_plain_splat_is_lifted(run, tmp_path):
     outcome = run(*words)
     assert outcome.code == 0, outcome.err
     document = outcome.json()
-    assert 1 < document["views"] <= VIEWS and document["atoms"] > 0
+    assert 1 < document["views"] <= LIFTING.views and document["atoms"] > 0
     lifted = read(tmp_path / "lifted.ply")
     assert lifted.semantics.num_atoms == document["atoms"] and lifted.semantics.space == "minilm"
     assert torch.equal(lifted.gaussians.means, stripes().gaussians.means)

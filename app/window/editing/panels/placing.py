@@ -3,7 +3,8 @@
 from imgui_bundle import icons_fontawesome_6 as fa
 from imgui_bundle import imgui
 
-from langflash_core.scene.changes import SCALES, Moved
+from langflash_core.scene.changes import Moved
+from langflash_core.scene.settings import CHANGES
 
 from ... import commands as do
 from ...kit import theme, widgets
@@ -61,7 +62,7 @@ def _fields(state: State, pivot: placing.Spot, look: Look, right: float) -> list
             imgui.same_line(0, look.px(5))
         imgui.set_next_item_width(look.px(_FIELD))
         speed = unit * _SPEEDS[editing.handle]
-        low, high = SCALES if editing.handle is Handle.SCALE else (0.0, 0.0)
+        low, high = CHANGES.scales if editing.handle is Handle.SCALE else (0.0, 0.0)
         edited, value = imgui.drag_float(f"##{'xyz'[place]}", number, speed, low, high, digits)
         widgets.tooltip("Drag, or double-click and type; relative to where the selection is now")
         if edited:

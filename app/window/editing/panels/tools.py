@@ -3,7 +3,7 @@
 from imgui_bundle import ImVec2, imgui
 from imgui_bundle import icons_fontawesome_6 as fa
 
-from langflash_core.mending.recipes import MOST_MARGIN
+from langflash_core.mending.settings import RECIPE_DEFAULTS
 from langflash_core.scene.edits import Combine
 
 from ... import commands as do
@@ -361,7 +361,8 @@ def _hiding(state: State, asked: Hiding, look: Look, right: float) -> list[do.Co
 def _margin(state: State, asked: Hiding, look: Look, right: float) -> list[do.Command]:
     """How much around the selection is hidden with it, and how many Gaussians that are."""
     tip = "How much around it is hidden too, as a share of a photo's longer side"
-    label, text, limits = "Margin##margin", f"{100 * asked.margin:.1f} %", (0.0, MOST_MARGIN)
+    label, text = "Margin##margin", f"{100 * asked.margin:.1f} %"
+    limits = (0.0, RECIPE_DEFAULTS.most_margin)
     widgets.go_on(widgets.named(label, look.px(_MARGIN_SLIDER)), right, look.px(14))
     changed, margin = widgets.slider(label, asked.margin, limits, text, tip, look.px(_MARGIN_SLIDER))
     found = None if state.editing.marks is None else asked.mask(state.editing.marks)
