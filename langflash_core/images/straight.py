@@ -84,8 +84,8 @@ def _drawn(pixels: np.ndarray, centre: np.ndarray, bend: float, scale: float) ->
     columns, rows = np.meshgrid(np.arange(width) + 0.5, np.arange(height) + 0.5)
     straight = (np.stack((columns, rows), -1) - centre) / scale
     places = (bent(straight, bend) + centre - 0.5).astype(np.float32)
-    # pyright: ignore
-    return cv2.remap(pixels, places, None, cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE)
+    nearest = cv2.BORDER_REPLICATE
+    return cv2.remap(pixels, places, None, cv2.INTER_CUBIC, borderMode=nearest)  # pyright: ignore
 
 
 def _redrawn(image: Tensor, centre: np.ndarray, bend: float, scale: float) -> Tensor:

@@ -4,11 +4,11 @@ import torch
 from jaxtyping import Bool, Float
 from torch import Tensor
 
-from langflash_core.language.answers import TOP_FRACTION
 from langflash_core.language.relevance import CompiledQuery, relevance_maps
+from langflash_core.language.settings import ANSWERING
 from langflash_core.types import Scene, Semantics
 
-_ENOUGH = 200_000  # Gaussians of a scene that are asked: of each of 32 photos some six of `TOP_FRACTION`
+_ENOUGH = 200_000  # Gaussians of a scene that are asked: of each of 32 photos some six of `top_fraction`
 _AT_ONCE = 1 << 16  # rows of dense weights: 33 MB for K = 128
 
 
@@ -49,5 +49,6 @@ def photos_that_answer(shares: Float[Tensor, "P W"]) -> tuple[int | None, ...]:
     if not known.shape[1]:
         return (None,) * len(shares)
     return tuple(
-        int(view) if share >= TOP_FRACTION else None for share, view in zip(*known.max(1), strict=True)
+        int(view) if share >= ANSWERING.top_fraction else None
+        for share, view in zip(*known.max(1), strict=True)
     )

@@ -475,9 +475,9 @@ class NameAtoms(EditTask):
     """The nearest household words of every atom, and which of them the scene answers."""
 
     def run(self, stopping: Asked) -> Iterator[Command]:
-        from langflash_core.language.answers import TOP_FRACTION
         from langflash_core.language.gaussians import answering_shares
         from langflash_core.language.relevance import compile_query
+        from langflash_core.language.settings import ANSWERING
         from langflash_core.language.spaces import language_space
         from langflash_core.language.words import nearest_words
 
@@ -490,7 +490,9 @@ class NameAtoms(EditTask):
         if asked:
             shares = answering_shares(spoken, compile_query(spoken, language_space(space), asked))
             best = shares.amax(1).tolist()
-            found = tuple(word for word, share in zip(asked, best, strict=True) if share >= TOP_FRACTION)
+            found = tuple(
+                word for word, share in zip(asked, best, strict=True) if share >= ANSWERING.top_fraction
+            )
         yield AtomsNamed(named, found)
 
 
