@@ -34,32 +34,50 @@ from langflash_core.scene.world import placed, turn_of
 from langflash_core.splat import render
 from langflash_core.types import NO_LANGUAGE, Camera, Scene
 
-SAMPLES = 6000
-"""Points of the surface that are looked at."""
-_WORDS = ("floor", "rug", "ceiling", "door")
-_SHARE = 0.02  # of the surface, from which what answers a word is believed in
-_LEVEL = math.cos(math.radians(30))  # of a surface that may be a floor or a ceiling
-_WINDOW = 0.04  # of the scene's height: surfaces so near in height are one
-_CONTRADICTED = 2.5  # deviations: what is farther from the guess did not tell it
-_NO_FLOOR = 0.1
-"""Of scenes, whose floor is a table top or the like: 8 of 100 held-out rooms, by their cameras."""
-_TABLE = 1.2  # m, at most so far
-_CALLED = ("ceiling", "door")
-_ANOTHER = 1e-3  # odds that such a thing is another than it is called, to those of its exact height
-_WIDE = 1.5  # e-folds about the mean of what is told, within which the scale is sought
-_BOTH = 0.3  # of what answers "floor", from which what lies lower is the floor
-_EDGE = 0.02  # of a picture's side: what reaches so near to its border may go on
 
-# What things measure: metres, and the standard deviation of its logarithm.
-CEILING = (2.60, 0.09)
-"""Of homes: minima of building codes are 2.3 to 2.5 m, and few ceilings are above 2.9 m. The deviations, also
-those below, hold what the scene's own heights are off by."""
-DOOR = (2.03, 0.07)
-"""Of door leaves: 1.98 (UK), 2.01 (DIN), 2.03 (US), 2.10 m."""
-EYE = (1.50, 0.20)
-"""Of a camera above the floor, as people hold it."""
-DEPTH = (1.08, 0.22)
-"""Of a metre as the network learned it; measured on held-out rooms."""
+@dataclass(frozen=True)
+class Levelling:
+    """How a scene stands, and how large it is."""
+
+    samples: int = 6000
+    """Points of the surface that are looked at."""
+    share: float = 0.02
+    """Of the surface, from which what answers a word is believed in."""
+    level: float = math.cos(math.radians(30))
+    """Cosine with up, of a surface that may be a floor or a ceiling."""
+    window: float = 0.04
+    """Of the scene's height: surfaces so near in height are one."""
+    contradicted: float = 2.5
+    """Deviations: what is farther from the guess did not tell it."""
+    no_floor: float = 0.1
+    """Of scenes, whose floor is a table top or the like: 8 of 100 held-out rooms, by their cameras."""
+    table: float = 1.2
+    """Metres, at most so far."""
+    another: float = 1e-3
+    """Odds that such a thing is another than it is called, to those of its exact height."""
+    wide: float = 1.5
+    """E-folds about the mean of what is told, within which the scale is sought."""
+    both: float = 0.3
+    """Of what answers "floor", from which what lies lower is the floor."""
+    edge: float = 0.02
+    """Of a picture's side: what reaches so near to its border may go on."""
+    ceiling: tuple[float, float] = (2.6, 0.09)
+    """Metres, and the standard deviation of its logarithm, of homes: minima of building codes are 2.3 to 2.5
+    m, and few ceilings are above 2.9 m. The deviations, also those below, hold what the scene's own heights
+    are off by."""
+    door: tuple[float, float] = (2.03, 0.07)
+    """The same of door leaves: 1.98 (UK), 2.01 (DIN), 2.03 (US), 2.10 m."""
+    eye: tuple[float, float] = (1.5, 0.2)
+    """The same of a camera above the floor, as people hold it."""
+    depth: tuple[float, float] = (1.08, 0.22)
+    """The same of a metre as the network learned it; measured on held-out rooms."""
+
+
+LEVELLING = Levelling()
+
+
+_WORDS = ("floor", "rug", "ceiling", "door")
+_CALLED = ("ceiling", "door")
 
 
 @dataclass(frozen=True)
@@ -76,7 +94,7 @@ class Surface:
     def called(self, *words: str) -> Bool[np.ndarray, " n"]:
         """What answers one of these words; nothing where too little does."""
         found = np.asarray(self.answers[:, [_WORDS.index(word) for word in words]].any(1))
-        return found if len(found) and found.mean() >= _SHARE else np.zeros_like(found)
+        return found if len(found) and found.mean() >= LEVELLING.share else np.zeros_like(found)
 
 
 @dataclass(frozen=True)
@@ -194,14 +212,14 @@ def on_its_head(scene: Scene, up: Float[np.ndarray, "3"]) -> bool:
     below, above = (
         (one >= threshold) & (one > other) for one, other in ((floor, ceiling), (ceiling, floor))
     )  # either word may find both
-    if below.mean() < _SHARE or above.mean() < _SHARE:
+    if below.mean() < LEVELLING.share or above.mean() < LEVELLING.share:
         return False
     heights = some.gaussians.means.double().numpy() @ up
     return bool(np.median(heights[below]) > np.median(heights[above]))
 
 
 def surface_of(scene: Scene) -> Surface:
-    """`SAMPLES` points of the surface; the same scene gives the same ones.
+    """`LEVELLING.samples` points of the surface; the same scene gives the same ones.
 
     Raises:
         InputError: there is no surface.
@@ -212,7 +230,7 @@ def surface_of(scene: Scene) -> Surface:
 
 
 def _surface_rows(scene: Scene) -> Scene:
-    """Those that show `SAMPLES` points of the surface.
+    """Those that show `LEVELLING.samples` points of the surface.
 
     Raises:
         InputError: there is no surface.
@@ -222,7 +240,7 @@ def _surface_rows(scene: Scene) -> Scene:
     total = float(areas.sum())
     if not total > 0:
         raise InputError("this scene holds no surface; make it again, or undo what deleted it")
-    places = (np.arange(SAMPLES) + 0.5) / SAMPLES * total
+    places = (np.arange(LEVELLING.samples) + 0.5) / LEVELLING.samples * total
     rows = np.searchsorted(np.cumsum(areas), places).clip(max=len(areas) - 1)
     return scene.rows(torch.from_numpy(rows))
 
@@ -297,14 +315,14 @@ def _north(scene: Scene, found: Directions, north: Sequence[float] | None) -> tu
 def _floor(surface: Surface, up: np.ndarray, most: float) -> tuple[float, str]:
     """Height of the floor along up, below `most`, the lowest camera's; scene units, and who says so."""
     heights = surface.places @ up
-    level = np.abs(surface.normals @ up) >= _LEVEL
-    window = _WINDOW * float(np.subtract(*np.quantile(heights, (0.99, 0.01))))
+    level = np.abs(surface.normals @ up) >= LEVELLING.level
+    window = LEVELLING.window * float(np.subtract(*np.quantile(heights, (0.99, 0.01))))
     named = surface.called("floor") & level & (heights < most)
     if named.any():
         low = heights[named]
         below = low <= densest(low, window) - 4 * window
         # A ceiling is flat and large, too, and a word may find both.
-        return densest(low[below] if below.mean() > _BOTH else low, window), "floor"
+        return densest(low[below] if below.mean() > LEVELLING.both else low, window), "floor"
     low = heights[level] if level.any() else heights
     bottom = float(np.quantile(heights, 0.01))
     if low.min() > bottom + 3 * window:  # what lies lowest is not level: the lowest that is
@@ -334,10 +352,17 @@ def evidence(scene: Scene, world: World, surface: Surface) -> list[Evidence]:
         eyes = scene.viewmats.double().inverse()[:, :3, 3].numpy() if scene.photos else np.zeros((0, 3))
         eye = -((eyes - np.array(world.origin)) @ turn_of(world).T)[:, 1]
         if len(eye) and np.median(eye) > 0:
-            found.append(Evidence("camera height", EYE[0] / float(np.median(eye)), EYE[1], EYE[0]))
+            found.append(
+                Evidence(
+                    "camera height",
+                    LEVELLING.eye[0] / float(np.median(eye)),
+                    LEVELLING.eye[1],
+                    LEVELLING.eye[0],
+                )
+            )
     posed = not torch.allclose(scene.viewmats[0], torch.eye(4), atol=1e-4)
     if scene.record.network_unit and not posed:  # else its unit is that of the poses
-        found.append(Evidence("depth", DEPTH[0] * scene.record.network_unit, DEPTH[1]))
+        found.append(Evidence("depth", LEVELLING.depth[0] * scene.record.network_unit, LEVELLING.depth[1]))
     return found
 
 
@@ -352,14 +377,14 @@ def guessed(found: Sequence[Evidence]) -> Guess | None:
     if not found:
         return None
     usual = np.mean([math.log(each.metres) for each in found])
-    scales = np.linspace(usual - _WIDE, usual + _WIDE, 601)  # logarithms
-    offsets = np.linspace(0.0, _TABLE, 49)  # m
-    scores = np.full(len(offsets), math.log(_NO_FLOOR / (len(offsets) - 1)))
-    scores[0] = math.log(1 - _NO_FLOOR)
+    scales = np.linspace(usual - LEVELLING.wide, usual + LEVELLING.wide, 601)  # logarithms
+    offsets = np.linspace(0.0, LEVELLING.table, 49)  # m
+    scores = np.full(len(offsets), math.log(LEVELLING.no_floor / (len(offsets) - 1)))
+    scores[0] = math.log(1 - LEVELLING.no_floor)
     scores = np.tile(scores, (len(scales), 1))
     for each in found:
         told = -0.5 * each.misses(scales[:, None], offsets) ** 2
-        scores += np.logaddexp(told, math.log(_ANOTHER)) if each.name in _CALLED else told
+        scores += np.logaddexp(told, math.log(LEVELLING.another)) if each.name in _CALLED else told
     chances = np.exp(scores - scores.max())
     chances /= chances.sum()
     mean = float(chances.sum(1) @ scales)
@@ -368,7 +393,8 @@ def guessed(found: Sequence[Evidence]) -> Guess | None:
     agree = [
         each
         for each in found
-        if (floor or not each.height) and abs(each.misses(np.array(mean), np.array(0.0))) <= _CONTRADICTED
+        if (floor or not each.height)
+        and abs(each.misses(np.array(mean), np.array(0.0))) <= LEVELLING.contradicted
     ]
     names = tuple(each.name for each in sorted(agree or found, key=lambda each: each.error))
     low, middle, high = (math.exp(mean + step) for step in (-error, 0.0, error))
@@ -377,13 +403,17 @@ def guessed(found: Sequence[Evidence]) -> Guess | None:
 
 def _of_ceiling(surface: Surface, heights: np.ndarray, turn: np.ndarray) -> list[Evidence]:
     """The height of what answers "ceiling", is level, and has little above it."""
-    level = np.abs(surface.normals @ turn[1]) >= _LEVEL
+    level = np.abs(surface.normals @ turn[1]) >= LEVELLING.level
     named = surface.called("ceiling") & level & (heights > 0)
-    if named.mean() < _SHARE / 2:
+    if named.mean() < LEVELLING.share / 2:
         return []
     top = float(np.quantile(heights, 0.995))
-    high = densest(heights[named], _WINDOW * top)
-    return [Evidence("ceiling", CEILING[0] / high, CEILING[1], CEILING[0])] if high > 0.85 * top else []
+    high = densest(heights[named], LEVELLING.window * top)
+    return (
+        [Evidence("ceiling", LEVELLING.ceiling[0] / high, LEVELLING.ceiling[1], LEVELLING.ceiling[0])]
+        if high > 0.85 * top
+        else []
+    )
 
 
 def _of_door(scene: Scene, surface: Surface, heights: np.ndarray) -> list[Evidence]:
@@ -399,7 +429,7 @@ def _of_door(scene: Scene, surface: Surface, heights: np.ndarray) -> list[Eviden
         or not any(_inside(scene, view, top) for view in range(scene.num_views))
     ):
         return []
-    return [Evidence("door", DOOR[0] / float(high), DOOR[1], DOOR[0])]
+    return [Evidence("door", LEVELLING.door[0] / float(high), LEVELLING.door[1], LEVELLING.door[0])]
 
 
 def _inside(scene: Scene, view: int, places: np.ndarray) -> bool:
@@ -410,7 +440,9 @@ def _inside(scene: Scene, view: int, places: np.ndarray) -> bool:
     with np.errstate(all="ignore"):
         pixels = (pos_c / pos_c[:, 2:]) @ K[:2].T
     size = np.array([camera.width, camera.height])
-    well = (pos_c[:, 2] > 0) & ((pixels > _EDGE * size) & (pixels < (1 - _EDGE) * size)).all(1)
+    well = (pos_c[:, 2] > 0) & (
+        (pixels > LEVELLING.edge * size) & (pixels < (1 - LEVELLING.edge) * size)
+    ).all(1)
     return bool(well.mean() > 0.9)
 
 
@@ -453,7 +485,7 @@ def measured_by(scene: Scene, name: str, metres: float) -> Scene:
     world = scene.record.world
     if world is None:
         raise InputError("this scene is not level yet; run langflash level first")
-    usual = {"ceiling": CEILING, "door": DOOR}[name][0]
+    usual = {"ceiling": LEVELLING.ceiling, "door": LEVELLING.door}[name][0]
     found = [each for each in evidence(scene, world, surface_of(scene)) if each.name == name]
     if not found:
         raise InputError(

@@ -40,23 +40,45 @@ from langflash_core.splat.compose import shares
 from langflash_core.types import Camera, Frame, Scene, Semantics, Views
 
 PRESET = "mini"
-VIEWS = 8  # what the network was shaped for
-_SHAPE = (4, 3)  # width to height of a view
-_GREY = 0.5  # behind what a view shows, as behind transparent photos
-_COVERED = 0.5  # alpha from which a pixel speaks of the scene
-_BLUR = 5  # pixels, odd
-_FEWEST_SHOWN = 0.02  # of a view, to be compared with its photo
-_FLAT = 0.002  # change of brightness from pixel to pixel, of 1: a wall
-_ALIKE = 0.3
-"""Likeness below which a photo's pose is in doubt: of right ones it is .86 and more where the scene was made
-of neighbours, of others within .2 of 0."""
-_SPARED = 0.25  # of the photos may be less alike: somebody walks through them
-_SEEN = 1e-3  # sum of c_ip below which a Gaussian counts as not seen
-_TOP = 8  # weights kept per Gaussian
+
+
+@dataclass(frozen=True)
+class Lifting:
+    """How scenes of others get language."""
+
+    views: int = 8
+    """What the network was shaped for."""
+    shape: tuple[int, int] = (4, 3)
+    """Width to height of a view."""
+    grey: float = 0.5
+    """Behind what a view shows, as behind transparent photos."""
+    covered: float = 0.5
+    """Alpha from which a pixel speaks of the scene."""
+    blur: int = 5
+    """Pixels, odd."""
+    fewest_shown: float = 0.02
+    """Of a view, to be compared with its photo."""
+    flat: float = 0.002
+    """Change of brightness from pixel to pixel, of 1: a wall."""
+    alike: float = 0.3
+    """Likeness below which a photo's pose is in doubt: of right ones it is .86 and more where the scene
+    was made of neighbours, of others within .2 of 0."""
+    spared: float = 0.25
+    """Of the photos may be less alike: somebody walks through them."""
+    seen: float = 1e-3
+    """Sum of c_ip below which a Gaussian counts as not seen."""
+    top: int = 8
+    """Weights kept per Gaussian."""
+    quality: int = 88
+    """Of a photo's JPEG."""
+
+
+LIFTING = Lifting()
+
+
 UP = "-y"  # of the world of a `Scene`
 _TO_DOWN = {"-y": "RDF", "y": "RUB", "z": "RBD", "-z": "RFU", "x": "DLF", "-x": "URF"}  # turns: +y comes down
 UPS = tuple(_TO_DOWN)
-_QUALITY = 88
 Progress = Callable[[str, float], None]
 Renderer = Callable[[Scene, Camera], Frame]
 Sees = Callable[[Views, Tensor, Tensor], tuple[Tensor, Tensor]]
@@ -97,7 +119,7 @@ def lift(
         told("done", 1.0)
         doubt = _doubt(looked.frames, photos)
         return lifted.with_record(warnings=(*lifted.record.warnings, doubt)) if doubt else lifted
-    looked = _looked(scene, own_cameras(scene, VIEWS, up), None, draw, see, told)
+    looked = _looked(scene, own_cameras(scene, LIFTING.views, up), None, draw, see, told)
     told("done", 1.0)
     return _with_hint(_spoken(scene, looked, network.calibration), up)
 
@@ -187,7 +209,7 @@ def posed_views(poses: Path, photos: Sequence[Path], shift: Shift | None = None)
         SceneFileError: the poses cannot be used. ImageError: a photo cannot.
     """
     posed = read_posed(poses).of(photos)
-    step = 1 if photos else -(-len(posed.paths) // VIEWS)
+    step = 1 if photos else -(-len(posed.paths) // LIFTING.views)
     posed = posed.at(range(0, len(posed.paths), step)).upright()
     preset = PRESETS[PRESET]
     views = load_views(
@@ -209,7 +231,7 @@ def own_cameras(scene: Scene, count: int, up: str = UP) -> list[Camera]:
     upright = replace(scene.gaussians, means=(scene.gaussians.means.double() @ turn.T).float())
     to_upright = torch.eye(4)
     to_upright[:3, :3] = turn
-    size = fitting_size(*_SHAPE, preset.native_area, preset.patch)
+    size = fitting_size(*LIFTING.shape, preset.native_area, preset.patch)
     return [replace(c, viewmat=c.viewmat @ to_upright) for c in lookouts(upright, count, size)]
 
 
@@ -217,7 +239,7 @@ def own_views(frames: Sequence[Frame], cameras: Sequence[Camera]) -> Views:
     """Drawn views as photos, over grey."""
     images = []
     for frame in frames:
-        grey = frame.rgb + (1 - frame.alphas[..., None]) * _GREY
+        grey = frame.rgb + (1 - frame.alphas[..., None]) * LIFTING.grey
         images.append(grey.clamp(0, 1).permute(2, 0, 1).float())
     names = tuple(f"view {number}" for number in range(1, len(frames) + 1))
     Ks = torch.stack([camera.K.float() for camera in cameras])
@@ -227,7 +249,7 @@ def own_views(frames: Sequence[Frame], cameras: Sequence[Camera]) -> Views:
 def _jpeg(image: Tensor) -> bytes:
     stream = io.BytesIO()
     pixels = (image.permute(1, 2, 0).numpy() * 255).round().astype(np.uint8)
-    Image.fromarray(pixels).save(stream, "JPEG", quality=_QUALITY)
+    Image.fromarray(pixels).save(stream, "JPEG", quality=LIFTING.quality)
     return stream.getvalue()
 
 
@@ -240,7 +262,7 @@ def _check_shown(frames: Sequence[Frame]) -> None:
     """Raises:
     InputError: the first view, or most of them, show nothing.
     """
-    shown = [float((frame.alphas >= _COVERED).float().mean()) for frame in frames]
+    shown = [float((frame.alphas >= LIFTING.covered).float().mean()) for frame in frames]
     if not shown or not shown[0] or sum(share > 0.02 for share in shown) * 2 <= len(shown):
         raise InputError(
             "the views show almost nothing of the scene; check that the poses are in its world and its unit"
@@ -255,24 +277,24 @@ def likeness(frame: Frame, photo: Float[Tensor, "3 H W"]) -> float:
     or flat.
     """
     weights = torch.tensor((0.299, 0.587, 0.114), dtype=torch.float32)
-    drawn = frame.rgb.float().cpu() / frame.alphas.float().cpu().clamp_min(_COVERED)[..., None]
+    drawn = frame.rgb.float().cpu() / frame.alphas.float().cpu().clamp_min(LIFTING.covered)[..., None]
     greys = _blurred(torch.stack((drawn @ weights, photo.float().cpu().permute(1, 2, 0) @ weights)))
-    covered = _blurred((frame.alphas.cpu() >= _COVERED).float()[None])[0, 1:, 1:] > 1 - 1e-3
-    if float(covered.float().mean()) < _FEWEST_SHOWN:
+    covered = _blurred((frame.alphas.cpu() >= LIFTING.covered).float()[None])[0, 1:, 1:] > 1 - 1e-3
+    if float(covered.float().mean()) < LIFTING.fewest_shown:
         return math.nan
     across, down = greys[:, 1:, 1:] - greys[:, 1:, :-1], greys[:, 1:, 1:] - greys[:, :-1, 1:]
     gradients = torch.stack((across, down), -1)[:, covered].double()  # (2, n, 2)
     sizes = gradients.square().sum(-1).mean(1).sqrt()  # (2,)
-    if float(sizes.min()) < _FLAT:
+    if float(sizes.min()) < LIFTING.flat:
         return math.nan
     return float(gradients.prod(0).sum(-1).mean() / sizes.prod())
 
 
 def _blurred(pictures: Float[Tensor, "n H W"]) -> Float[Tensor, "n H W"]:
-    """By `_BLUR` pixels, twice, which forgives poses a few pixels."""
+    """By `LIFTING.blur` pixels, twice, which forgives poses a few pixels."""
     for _ in range(2):
         pictures = torch.nn.functional.avg_pool2d(
-            pictures[:, None], _BLUR, 1, _BLUR // 2, count_include_pad=False
+            pictures[:, None], LIFTING.blur, 1, LIFTING.blur // 2, count_include_pad=False
         )[:, 0]
     return pictures
 
@@ -282,8 +304,8 @@ def _doubt(frames: Sequence[Frame], views: Views) -> str:
     poses, or nothing."""
     found = [likeness(frame, photo) for frame, photo in zip(frames, views.images, strict=True)]
     known = [each for each in found if not math.isnan(each)]
-    low = float(np.quantile(known, _SPARED, method="lower")) if known else 1.0
-    if low >= _ALIKE:
+    low = float(np.quantile(known, LIFTING.spared, method="lower")) if known else 1.0
+    if low >= LIFTING.alike:
         return ""
     return (
         f"the photos do not look like the scene from their poses (likeness {low:.2f} of 1); "
@@ -304,7 +326,7 @@ def _carried_back(
     totals = torch.zeros(len(scene.gaussians))
     for index, (camera, values, frame) in enumerate(zip(cameras, maps, frames, strict=True)):
         told("carrying back", 0.6 + 0.4 * index / len(cameras))
-        trust = (frame.alphas >= _COVERED).float()
+        trust = (frame.alphas >= LIFTING.covered).float()
         for rows, counts in _pictured(scene, camera, draw):
             some = scene.gaussians.rows(rows)
             own, count = gathered(some, camera, values.permute(1, 2, 0), trust * counts)
@@ -333,10 +355,10 @@ def _spoken(scene: Scene, looked: _Looked, calibration: dict) -> Scene:
     Raises:
         InputError: no view shows anything of it.
     """
-    seen = looked.totals >= _SEEN
+    seen = looked.totals >= LIFTING.seen
     if not bool(seen.any()):
         raise InputError("no view shows a Gaussian of the scene; check the poses")
-    ids, values = sparse_weights(looked.shares(), _TOP)
+    ids, values = sparse_weights(looked.shares(), LIFTING.top)
     hidden = (~seen).nonzero()[:, 0]
     if len(hidden):
         rows = seen.nonzero()[:, 0]

@@ -19,13 +19,8 @@ from torch import Tensor
 from langflash_core.export import opened
 from langflash_core.geometry.fusion import ColouredView, Surface, fuse
 from langflash_core.geometry.harmonics import SH_C0
-from langflash_core.language.answers import (
-    BOX_QUANTILES,
-    COVERED_ALPHA,
-    MIN_AREA,
-    TOP_FRACTION,
-    oriented_box,
-)
+from langflash_core.language.answers import oriented_box
+from langflash_core.language.settings import ANSWERING
 from langflash_core.language.spaces import language_space
 from langflash_core.language.spoken import compile_spoken
 from langflash_core.meant import check_threshold, meant_relevance
@@ -44,9 +39,9 @@ def segment(
 ) -> Segments:
     """The Gaussians that answer each phrase, and the connected things among them.
 
-    A phrase is found where some photo shows what answers it with `MIN_AREA` of its pixels. Connected things
-    that no photo shows so large are no things, be they small or hidden behind others; but the one that is
-    shown best always is. Of what is not found, nothing is a member.
+    A phrase is found where some photo shows what answers it with `ANSWERING.min_area` of its pixels.
+    Connected things that no photo shows so large are no things, be they small or hidden behind others; but
+    the one that is shown best always is. Of what is not found, nothing is a member.
 
     Args:
         scene: or the path of one. prompts: phrases, or one.
@@ -85,21 +80,22 @@ def photo_shares(scene: Scene) -> Tensor:
 def connected_things(scene: Scene, members: Tensor, shares: Tensor) -> Tensor:
     """(N,) numbers of `things`, without those that no photo shows well enough; 0 where that is all."""
     numbers = torch.from_numpy(things(scene, members.numpy()))
-    if not numbers.any() or float(shares[:, members].sum(1).max()) < MIN_AREA:
+    if not numbers.any() or float(shares[:, members].sum(1).max()) < ANSWERING.min_area:
         return torch.zeros_like(numbers)
     shown = shares.new_zeros(len(shares), int(numbers.max()) + 1).index_add_(1, numbers, shares).amax(0)
-    kept = shown >= min(MIN_AREA, float(shown[1:].max()))
+    kept = shown >= min(ANSWERING.min_area, float(shown[1:].max()))
     kept[0] = False  # of no thing
     return torch.where(kept, kept.cumsum(0), 0)[numbers]
 
 
 def _scores(relevance: Tensor, shares: Tensor) -> Tensor:
-    """(P,) mean relevancy of what answers best, as much as makes up `TOP_FRACTION` of all shares (N,)."""
+    """(P,) mean relevancy of what answers best, as much as makes up `ANSWERING.top_fraction` of all shares
+    (N,)."""
     if not float(shares.sum()) > 0:
         return relevance.new_zeros(len(relevance))
     best, order = relevance.sort(dim=1, descending=True)
     own = shares[order]
-    left = TOP_FRACTION * shares.sum() - (own.cumsum(1) - own)
+    left = ANSWERING.top_fraction * shares.sum() - (own.cumsum(1) - own)
     taken = torch.minimum(own, left.clamp_min(0))
     return (best * taken).sum(1) / taken.sum(1)
 
@@ -205,7 +201,7 @@ def surface(scene: Scene, members: Tensor, cameras: Sequence[Camera], render: Re
     if not len(part.gaussians):
         return None
     means = part.gaussians.means.detach().cpu().double().numpy()
-    low, high = np.quantile(means, BOX_QUANTILES, axis=0)
+    low, high = np.quantile(means, ANSWERING.box_quantiles, axis=0)
     views = [_coloured_view(render(part, camera, weight_maps=False), camera) for camera in cameras]
     return fuse(views, low, high, 2 * float(np.median(disc_radii(part.gaussians))))
 
@@ -213,7 +209,7 @@ def surface(scene: Scene, members: Tensor, cameras: Sequence[Camera], render: Re
 def _coloured_view(frame: Frame, camera: Camera) -> ColouredView:
     """Depths where at least half of a pixel is covered."""
     alphas = frame.alphas.cpu()
-    depths = torch.where(alphas >= COVERED_ALPHA, frame.depths.cpu(), 0.0)
+    depths = torch.where(alphas >= ANSWERING.covered_alpha, frame.depths.cpu(), 0.0)
     straight = frame.rgb.cpu() / alphas.clamp_min(_LEAST)[..., None]
     colours = (straight.clamp(0, 1) * 255).round().byte()
     matrices = camera.viewmat.cpu().double().numpy(), camera.K.cpu().double().numpy()

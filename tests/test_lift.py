@@ -9,7 +9,7 @@ import torch
 
 from langflash_core.errors import Cancelled, InputError
 from langflash_core.geometry.rotations import matrix
-from langflash_core.lift import UPS, VIEWS, lift, likeness, own_cameras, own_views
+from langflash_core.lift import LIFTING, UPS, lift, likeness, own_cameras, own_views
 from langflash_core.scene.bare import bare_scene
 from langflash_core.scene.checks import check_scene
 from langflash_core.splat import rasterize, render
@@ -153,8 +153,8 @@ def test_the_axis_that_points_up_is_up_in_every_view(up):
     whole = bare_scene(stripes().gaussians, "wall.ply")
     upward = torch.zeros(3)
     upward["xyz".index(up[-1])] = -1.0 if up.startswith("-") else 1.0
-    cameras = own_cameras(whole, VIEWS, up)
-    assert 0 < len(cameras) <= VIEWS
+    cameras = own_cameras(whole, LIFTING.views, up)
+    assert 0 < len(cameras) <= LIFTING.views
     for camera in cameras:
         turn = camera.viewmat[:3, :3]
         assert torch.allclose(turn @ turn.T, torch.eye(3), atol=1e-5)  # of float32

@@ -22,6 +22,7 @@ from langflash_core.reconstruction import stages
 from langflash_core.reconstruction.views import found_views, straight_prediction
 from langflash_core.splat import render
 from langflash_core.types import Camera, FoundLens, Gaussians, Lenses, Prediction, Scene, Semantics, Views
+from tests.torch_threads import torch_threads
 
 SMALL = 112  # pixels: 8 x 8 patches keep a pass below a second
 
@@ -29,10 +30,8 @@ SMALL = 112  # pixels: 8 x 8 patches keep a pass below a second
 @pytest.fixture(autouse=True, scope="module")
 def one_thread():
     """Passes this small gain little from more threads, and test workers share the machine."""
-    before = torch.get_num_threads()
-    torch.set_num_threads(1)
-    yield
-    torch.set_num_threads(before)
+    with torch_threads(1):
+        yield
 
 
 @pytest.fixture(scope="session")

@@ -8,8 +8,8 @@ import torch
 from torch import Tensor
 from torch.nn.functional import interpolate
 
-from langflash_core.language.answers import COVERED_ALPHA
 from langflash_core.language.relevance import relevance_maps
+from langflash_core.language.settings import ANSWERING
 from langflash_core.splat import render
 from langflash_core.types import Camera
 
@@ -43,7 +43,7 @@ def true_view(case: Case, camera: Camera) -> View:
     frame = render(scene, camera)
     assert frame.weight_maps is not None
     relevance = relevance_maps(frame.weight_maps, _moved(case.uncompiled, device))
-    return View(frame.rgb.cpu(), relevance.cpu(), (frame.alphas >= COVERED_ALPHA).cpu())
+    return View(frame.rgb.cpu(), relevance.cpu(), (frame.alphas >= ANSWERING.covered_alpha).cpu())
 
 
 def errors_of(drawn: Sequence[View], truth: Sequence[View], threshold: float) -> Errors:

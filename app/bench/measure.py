@@ -14,20 +14,15 @@ from dataclasses import dataclass, field, replace
 import moderngl
 import numpy as np
 
-from langflash_core.base.graphics import Programs
 from langflash_core.base.running import Progress
 from langflash_core.types import Camera, Scene
 
 from ..gl import SplatRenderer
 from ..gl.canvas import Canvas
-from ..gl.ordering import MOST_BEHIND
 from ..gl.processor.still import draw_still
-from ..gl.shapes import MakeShapes
-from ..gl.splats import SplatBuffers
 from .cases import Case
 from .errors import Errors, View, errors_of, true_view
 from .modes import DEFAULT, Mode
-from .twins import StaleOrder
 
 ERROR_FRAMES = 2  # the reference takes seconds to minutes a view
 _TIMER_END = 2**32 - 1  # nanoseconds: moderngl reads 32 bits
@@ -106,7 +101,6 @@ class _Bench:
         self.counter = ctx.query(samples=True)
         self._canvases: dict[tuple, Canvas] = {}
         self._renderers: dict[tuple, SplatRenderer] = {}
-        self._late: dict[tuple, StaleOrder] = {}
         self._scenes: dict[tuple, Scene] = {_scene_key(mode): mode.scene(case.scene) for mode in modes}
 
     def camera(self, mode: Mode, frame: int) -> Camera:
@@ -116,16 +110,14 @@ class _Bench:
             return camera
         return camera.resized(max(1, camera.width // mode.shrink), max(1, camera.height // mode.shrink))
 
-    def prepared(self, mode: Mode, frame: int) -> SplatRenderer:
-        """The mode's renderer as it stands before it sees the frame's camera: nothing counts as drawn."""
+    def prepared(self, mode: Mode) -> SplatRenderer:
+        """The mode's renderer as it stands before it sees a frame's camera: nothing counts as drawn."""
         key = _renderer_key(mode)
         if key not in self._renderers:
-            self._renderers[key] = self._made(mode, key)
+            self._renderers[key] = self._made(mode)
         renderer = self._renderers[key]
         renderer.forget()
-        if key in self._late:
-            self._late[key].sort_for(self.camera(mode, max(frame - MOST_BEHIND, -1)))
-        self.ask(renderer, mode)
+        self.ask(renderer)
         if mode.fast:
             renderer.carry()
         self.ctx.finish()
@@ -139,24 +131,16 @@ class _Bench:
         else:
             renderer.draw(camera, fast=mode.fast)
 
-    def ask(self, renderer: SplatRenderer, mode: Mode, other: bool = False) -> None:
+    def ask(self, renderer: SplatRenderer, other: bool = False) -> None:
         """The case's phrases; `other`: other numbers of equal work."""
         question = self.case.compiled
-        renderer.ask(replace(question, prompts=-question.prompts) if other else question, mode.answers)
+        renderer.ask(replace(question, prompts=-question.prompts) if other else question)
 
-    def _made(self, mode: Mode, key: tuple) -> SplatRenderer:
-        def splats(
-            ctx: moderngl.Context, programs: Programs, scene: Scene, shapes: MakeShapes
-        ) -> SplatBuffers:
-            made = mode.splats(ctx, programs, scene, shapes)
-            if isinstance(made, StaleOrder):
-                self._late[key] = made
-            return made
-
+    def _made(self, mode: Mode) -> SplatRenderer:
         shared = (mode.precision, mode.shrink)
         if shared not in self._canvases:
             self._canvases[shared] = Canvas(self.ctx, mode.precision)
-        renderer = SplatRenderer(self.ctx, mode.precision, splats=splats, canvas=self._canvases[shared])
+        renderer = SplatRenderer(self.ctx, mode.precision, canvas=self._canvases[shared])
         renderer.set_scene(self._scenes[_scene_key(mode)])
         return renderer
 
@@ -165,11 +149,10 @@ class _Bench:
             owned.release()
         self._renderers.clear()
         self._canvases.clear()
-        self._late.clear()
 
 
 def _renderer_key(mode: Mode) -> tuple:
-    return mode.precision, mode.shrink, mode.splats, *_scene_key(mode)
+    return mode.precision, mode.shrink, *_scene_key(mode)
 
 
 def _scene_key(mode: Mode) -> tuple:
@@ -193,7 +176,7 @@ def _errors(bench: _Bench, frames: tuple[int, ...], progress: Progress) -> dict[
         progress(f"errors of {mode.name}", 0.3 + 0.1 * done / len(bench.modes))
         drawn = []
         for frame, true in zip(frames, truth, strict=True):
-            renderer = bench.prepared(mode, frame)
+            renderer = bench.prepared(mode)
             bench.draw(renderer, mode, bench.camera(mode, frame))
             drawn.append(View(renderer.frame().rgb, renderer.relevance(), true.covered))
         errors[mode] = errors_of(drawn, truth, bench.case.compiled.threshold)
@@ -212,7 +195,7 @@ def _times(bench: _Bench, progress: Progress) -> dict[Mode, Times]:
 
 
 def _time_frame(bench: _Bench, mode: Mode, frame: int, into: Times) -> None:
-    renderer, camera = bench.prepared(mode, frame), bench.camera(mode, frame)
+    renderer, camera = bench.prepared(mode), bench.camera(mode, frame)
 
     def moving() -> None:
         with bench.timer:
@@ -220,7 +203,7 @@ def _time_frame(bench: _Bench, mode: Mode, frame: int, into: Times) -> None:
             renderer.heat_texture(0)
 
     def another() -> None:
-        bench.ask(renderer, mode, other=True)
+        bench.ask(renderer, other=True)
         renderer.heat_texture(0)
 
     before = time.process_time()
@@ -231,7 +214,7 @@ def _time_frame(bench: _Bench, mode: Mode, frame: int, into: Times) -> None:
         into.gpu.append(elapsed / 1e6)
     if not mode.fast:
         renderer.forget(answers_only=True)
-        bench.ask(renderer, mode)
+        bench.ask(renderer)
         into.answers.append(_milliseconds(bench.ctx, lambda: renderer.heat_texture(0)))
     into.phrases.append(_milliseconds(bench.ctx, another))
 
@@ -242,12 +225,12 @@ def _stages(bench: _Bench, progress: Progress) -> Stages:
     width, height = bench.case.size
     for frame in _error_frames(bench.case.path.num_frames):
         progress("stages", 0.9)
-        renderer, camera = bench.prepared(DEFAULT, frame), bench.camera(DEFAULT, frame)
+        renderer, camera = bench.prepared(DEFAULT), bench.camera(DEFAULT, frame)
         colour.append(_milliseconds(bench.ctx, lambda: renderer.draw(camera, weight_maps=False)))  # noqa: B023
         before = renderer.passes["weights"]
         maps.append(_milliseconds(bench.ctx, lambda: renderer.draw(camera)))  # noqa: B023
         passes = renderer.passes["weights"] - before
-        renderer = bench.prepared(DEFAULT, frame)
+        renderer = bench.prepared(DEFAULT)
         with bench.counter:
             renderer.draw(camera, weight_maps=False)
         layers.append(bench.counter.samples / (width * height))

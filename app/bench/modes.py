@@ -4,16 +4,9 @@ from collections.abc import Collection
 from dataclasses import dataclass, replace
 from typing import Literal
 
-import moderngl
-
-from langflash_core.base.graphics import draws_in_software
 from langflash_core.scene.thin import thin
 from langflash_core.scene.weights import renormalised
 from langflash_core.types import Scene
-
-from ..gl.answers import MakeAnswers, ShaderAnswers
-from ..gl.splats import SplatBuffers
-from .twins import StaleOrder
 
 
 @dataclass(frozen=True)
@@ -22,8 +15,7 @@ class Mode:
 
     axis: what is decided. name: how. precision: of the targets. kept: weights per Gaussian, None: all
     that the scene has. share: of the Gaussians, the others widened. fast: relevance from numbers
-    splatted beside the colour. shrink: of the picture's sides. splats: what the scene is uploaded to.
-    answers: who answers, None: the renderer's own choice.
+    splatted beside the colour. shrink: of the picture's sides.
     still: drawn on the processor, as the window does where OpenGL runs there too (app/gl/processor/still.py).
     colours: whether the picture's colours may differ from the default's, not its answers alone.
     """
@@ -35,8 +27,6 @@ class Mode:
     share: float = 1.0
     fast: bool = False
     shrink: int = 1
-    splats: type[SplatBuffers] = SplatBuffers
-    answers: MakeAnswers | None = None
     colours: bool = False
     still: bool = False
 
@@ -62,25 +52,19 @@ MODES = (
     Mode("weights", "m = 2", kept=2),
     Mode("weights", "m = 4", kept=4),
     Mode("weights", "m = 8", kept=8),
-    Mode("answers", "shader queries", answers=ShaderAnswers),
     Mode("resolution", "half resolution", shrink=2, colours=True),
     Mode("detail", "quarter of Gaussians", share=0.25, colours=True),
     Mode("rasteriser", "tiles on the processor", still=True, colours=True),
     Mode("rasteriser", "such tiles at half resolution", still=True, shrink=2, colours=True),
-    Mode("sort", "stale sort", splats=StaleOrder, colours=True),
 )
 AXES = tuple(dict.fromkeys(mode.axis for mode in MODES[1:]))
 
 
-def modes_for(ctx: moderngl.Context, scene: Scene, axes: Collection[str] = AXES) -> tuple[Mode, ...]:
-    """The default first, then the modes of these axes that differ from it here and on this scene: shaders
-    answer beside it where the renderer asks on the processor."""
+def modes_for(scene: Scene, axes: Collection[str] = AXES) -> tuple[Mode, ...]:
+    """The default first, then the modes of these axes that differ from it on this scene."""
     stored = scene.semantics.weight_ids.shape[1]
-    same = () if draws_in_software(ctx) else (ShaderAnswers,)
     return DEFAULT, *(
-        mode
-        for mode in MODES[1:]
-        if mode.axis in axes and (mode.kept is None or mode.kept < stored) and mode.answers not in same
+        mode for mode in MODES[1:] if mode.axis in axes and (mode.kept is None or mode.kept < stored)
     )
 
 

@@ -29,7 +29,7 @@ def measured_cases(cases: Sequence[Case], axes: Collection[str] | None, progress
             def told(stage: str, share: float, number: int = number) -> None:
                 progress(stage, (number + share) / len(cases))
 
-            modes = modes_for(context, case.scene, axes or AXES)
+            modes = modes_for(case.scene, axes or AXES)
             results.append(measure(context, case, modes, told))
         return document(machine(context), results)
     finally:

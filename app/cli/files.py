@@ -22,11 +22,11 @@ def checked_scene(path: Path) -> Path:
     return path
 
 
-def checked_photos(given: Sequence[Path]) -> list[Path]:
-    """Photos and films, each folder replaced by those in it; photos open.
+def out_of_folders(given: Sequence[Path]) -> list[Path]:
+    """Files, each folder replaced by the photos in it, or else its films.
 
     Raises:
-        ImageError: a photo is missing or does not open, a folder cannot be read or holds none.
+        ImageError: a folder cannot be read or holds none.
     """
     listed = list[Path]()
     for path in given:
@@ -37,6 +37,16 @@ def checked_photos(given: Sequence[Path]) -> list[Path]:
                 "langflash batch where its sub-folders hold them"
             )
         listed += found
+    return listed
+
+
+def checked_photos(given: Sequence[Path]) -> list[Path]:
+    """Photos and films, `out_of_folders`; photos open.
+
+    Raises:
+        ImageError: a photo is missing or does not open, a folder cannot be read or holds none.
+    """
+    listed = out_of_folders(given)
     for path in listed:
         if not is_film(path):
             readable_file(path, "photo", ImageError)

@@ -9,7 +9,7 @@ from langflash_core.base.files import readable_file
 from langflash_core.base.formats import is_film
 from langflash_core.base.running import Progress
 from langflash_core.errors import FilmError, InputError
-from langflash_core.images.pictures import FILM_PHOTOS, MAX_PHOTOS
+from langflash_core.images.settings import PHOTO_LIMITS
 from langflash_core.images.strip import REASONS, Choice, Strip, choose, notes_on
 
 
@@ -50,8 +50,8 @@ def with_frames(
     """Photos with films replaced by their frames; what is told of each film; and notes for people.
 
     Args:
-        most: frames of each film; None: `FILM_PHOTOS`, or as many as there is room for beside photos and
-            other films.
+        most: frames of each film; None: `PHOTO_LIMITS.film_photos`, or as many as there is room for beside
+            photos and other films.
 
     Raises:
         InputError: a film cannot be used, or there are no films and yet options for them, or too many photos.
@@ -61,7 +61,7 @@ def with_frames(
         if most is not None or start or end is not None:
             raise InputError("--frames, --from and --to are for films; leave them out")
         return list(photos), [], []
-    room = (MAX_PHOTOS - len(photos) + len(films)) // len(films)
+    room = (PHOTO_LIMITS.max_photos - len(photos) + len(films)) // len(films)
     if room < 2:
         raise InputError(f"{len(photos) - len(films)} photos leave no room for frames; choose fewer photos")
     taken, told, notes = list[Path](), list[dict[str, Any]](), list[str]()
@@ -70,7 +70,7 @@ def with_frames(
             taken.append(path)
             continue
         strip = look_through(path, progress, start=start, end=end)
-        choice = choose(strip, min(most or FILM_PHOTOS, room))
+        choice = choose(strip, min(most or PHOTO_LIMITS.film_photos, room))
         taken += [strip.path(index) for index in choice.chosen]
         told.append(summary(strip, choice))
         notes += notes_on(strip, choice)

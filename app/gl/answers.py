@@ -8,7 +8,8 @@ from collections.abc import Callable, Hashable
 import moderngl
 import numpy as np
 
-from langflash_core.language.relevance import EMPTY_NORM, CompiledQuery
+from langflash_core.language.relevance import CompiledQuery
+from langflash_core.language.settings import RELEVANCE
 
 from .layout import PHRASES_A_LAYER, num_groups
 from .packed import PackedMaps, blocks
@@ -108,7 +109,7 @@ class ShaderAnswers(Answers):
                 maps,
                 block,
                 textures={"squares": self._squares},
-                defines={"EMPTY_NORM": EMPTY_NORM},
+                defines={"EMPTY_NORM": RELEVANCE.empty_norm},
                 blend=ADDED,
                 equation=MAXIMUM,
             )

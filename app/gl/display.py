@@ -8,7 +8,7 @@ import numpy as np
 
 from langflash_core.base.colormaps import colour_stops
 from langflash_core.base.pictures import COUNT_COLOURS
-from langflash_core.language.answers import COVERED_ALPHA
+from langflash_core.language.settings import ANSWERING
 from langflash_core.scene.trust import COSINES
 from langflash_core.types import Camera, Scene
 
@@ -22,7 +22,7 @@ from .weights import Maps
 _HEAT_OPACITY = 0.7
 _LABEL_OPACITY = 0.6
 _TRUST_OPACITY = 0.7
-_COVERED: dict[str, float] = {"COVERED_ALPHA": COVERED_ALPHA}
+_COVERED: dict[str, float] = {"COVERED_ALPHA": ANSWERING.covered_alpha}
 MASK_STYLES = ("flat", "isolate", "hide", "dim")
 Background = tuple[float, float, float]
 Span = tuple[float, float]

@@ -12,7 +12,8 @@ that is on a scene, `langflash bench` says.
 import moderngl
 import numpy as np
 
-from langflash_core.language.relevance import EMPTY_NORM, CompiledQuery
+from langflash_core.language.relevance import CompiledQuery
+from langflash_core.language.settings import RELEVANCE
 
 from .answers import temperature_of
 from .layout import ATOMS_A_LAYER, LAYERS_A_PASS, PHRASES_A_LAYER, num_groups, num_layers
@@ -70,7 +71,7 @@ class FastPasses:
                 "fast.frag",
                 {"numbers": self.numbers.array},
                 {"first_phrase": PHRASES_A_LAYER * group, "temperature": temperature_of(compiled)},
-                {"EMPTY_NORM": EMPTY_NORM},
+                {"EMPTY_NORM": RELEVANCE.empty_norm},
             )
 
     def release(self) -> None:

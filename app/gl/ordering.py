@@ -120,10 +120,6 @@ class Ordering:
             self._take(self._job)
         return False
 
-    def quick(self, camera: Camera) -> np.ndarray:
-        """(n,) uint32, as `follow` finds it for a camera."""
-        return quick_order(self._places, camera).rows
-
     def _seeks(self, camera: Camera) -> bool:
         job = self._job
         return job is not None and job.exact and camera_key(job.camera) == camera_key(camera)

@@ -4,7 +4,7 @@ import moderngl
 import numpy as np
 from torch import Tensor
 
-from langflash_core.language.answers import COVERED_ALPHA
+from langflash_core.language.settings import ANSWERING
 from langflash_core.surface.settings import CONSISTENCY
 from langflash_core.types import Camera, Scene
 
@@ -127,4 +127,6 @@ def _depths(painter: Painter, splats: SplatBuffers, camera: Camera) -> np.ndarra
     sums = np.frombuffer(target.depth.read(), np.float32).reshape(camera.height, camera.width, 2)
     target.release()
     alphas = sums[..., 1]
-    return np.where(alphas >= COVERED_ALPHA, sums[..., 0] / np.maximum(alphas, COVERED_ALPHA), 0).astype("f4")
+    return np.where(
+        alphas >= ANSWERING.covered_alpha, sums[..., 0] / np.maximum(alphas, ANSWERING.covered_alpha), 0
+    ).astype("f4")

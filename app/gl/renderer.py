@@ -26,7 +26,6 @@ from langflash_core.scene.changes import Change
 from langflash_core.splat.projection import NEAR
 from langflash_core.types import Camera, Frame, Scene
 
-from .answers import MakeAnswers
 from .canvas import Canvas, Precision
 from .colours import hues
 from .display import Answer, Background, Drawn
@@ -252,11 +251,8 @@ class SplatRenderer:
         if self._picture is not None:
             self._picture = replace(self._picture, drawn=replace(self._picture.drawn, fill=gaps))
 
-    def ask(self, compiled: CompiledQuery | None, answers: MakeAnswers | None = None) -> None:
+    def ask(self, compiled: CompiledQuery | None) -> None:
         """Set the phrases; costs no splat pass while the weight maps are drawn.
-
-        Args:
-            answers: who compares them with weight maps; None: as the renderer was made.
 
         Raises:
             ValueError: the query was compiled for a dictionary of another size.
@@ -267,7 +263,7 @@ class SplatRenderer:
         received = compiled.factor.shape[0]
         if self._scene is not None and received != self._scene.num_atoms:
             raise ValueError(f"compiled: expected {self._scene.num_atoms} atoms, received {received}")
-        self._question = Question(compiled, self._canvas.hardware.answers if answers is None else answers)
+        self._question = Question(compiled, self._canvas.hardware.answers)
 
     # --- for who measures -------------------------------------------------------------------
 

@@ -18,7 +18,7 @@ from .editing.state import RECIPE_SUFFIX
 from .filming.state import Walk
 from .protocol import Command as Command
 from .scene import samples
-from .scene.drops import SCENE_SUFFIX, There, Typed
+from .scene.drops import There, Typed
 from .scene.state import FLIGHT_SECONDS
 from .state import MOST_LINES, NO_PALETTE, TOAST_SECONDS, Line, Palette, State, Stats, Toast
 
@@ -208,4 +208,4 @@ def _place_to_save(state: State) -> Path:
     """The scene's own file, or one beside its photos."""
     if state.scene.info is not None and state.scene.info.path is not None:
         return state.scene.info.path
-    return samples.beside(state.scene.photos).with_suffix(SCENE_SUFFIX)
+    return samples.beside(state.scene.photos)

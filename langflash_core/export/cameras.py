@@ -25,6 +25,7 @@ from langflash_core.base.limits import VIEWS
 from langflash_core.base.picture_files import STORED, opened_picture, stored_shape
 from langflash_core.errors import OutputError, SceneFileError
 from langflash_core.export.colmap import check_pinhole, pinhole, read_model, text_lines
+from langflash_core.export.settings import POINT_CLOUD
 from langflash_core.geometry.cameras import MIRRORED, invert_rigid, turned_camera
 from langflash_core.geometry.harmonics import SH_C0
 from langflash_core.geometry.quaternions import matrices_to_quats
@@ -34,9 +35,6 @@ COLMAP, TRANSFORMS = "cameras.txt", "transforms.json"
 _BINARY = "cameras.bin"
 _IMAGES = "images"
 _FLIP = torch.diag(torch.tensor([1.0, -1.0, -1.0, 1.0], dtype=torch.float64))  # OpenGL axes and OpenCV's
-MOST_POINTS = 100_000
-"""Of points3D.txt."""
-_SOLID = 0.1  # opacity from which a Gaussian is one of them
 _BENDS = ("k1", "k2", "k3", "k4", "k5", "k6", "p1", "p2", "s1", "s2", "s3", "s4")
 _OTHER_LENSES = ("is_fisheye", "fisheye", "equirectangular", "latlong", "orthographic", "ftheta_p0")
 """What says in a transforms.json that a lens is no pinhole, whatever its numbers are."""
@@ -254,11 +252,11 @@ def _picture_size(photo: bytes, path: Path) -> tuple[int, int]:
 
 
 def _points(scene: Scene) -> list[str]:
-    """Lines of points3D.txt: at most `MOST_POINTS` Gaussians that are seen, evenly chosen."""
+    """Lines of points3D.txt: at most `POINT_CLOUD.most_points` Gaussians that are seen, evenly chosen."""
     gaussians = scene.gaussians
-    solid = gaussians.means.isfinite().all(-1) & (gaussians.opacities >= _SOLID)
+    solid = gaussians.means.isfinite().all(-1) & (gaussians.opacities >= POINT_CLOUD.solid)
     rows = solid.nonzero()[:, 0]
-    rows = rows[:: max(1, -(-len(rows) // MOST_POINTS))]
+    rows = rows[:: max(1, -(-len(rows) // POINT_CLOUD.most_points))]
     colours = (0.5 + SH_C0 * gaussians.sh[rows, 0]).nan_to_num(0.5).clamp(0, 1) * 255
     places, shades = gaussians.means[rows].tolist(), colours.round().int().tolist()
     return [

@@ -8,10 +8,7 @@ Source: Lloyd, "Least squares quantization in PCM", 1982.
 import numpy as np
 import torch
 
-_SCALAR_STEPS, _VECTOR_STEPS = 24, 5
-_SAMPLE = 16  # vectors per centre that the steps look at
-_FEW = 9  # numbers of a vector, up to which a tree is quick: in more it looks everywhere
-_PAIRS_AT_ONCE = 1 << 20  # distances: 4 MB, which a processor's cache holds
+from langflash_core.export.settings import CODEBOOKS
 
 
 def scalar_codebook(values: np.ndarray, size: int) -> tuple[np.ndarray, np.ndarray]:
@@ -27,7 +24,7 @@ def scalar_codebook(values: np.ndarray, size: int) -> tuple[np.ndarray, np.ndarr
         sums = np.concatenate(([0.0], np.cumsum(ordered)))
         ranks = ordered[np.linspace(0, len(ordered) - 1, size - size // 2).astype(int)]
         book = np.unique(np.concatenate((ranks, np.linspace(ordered[0], ordered[-1], size // 2))))
-        for _ in range(_SCALAR_STEPS):
+        for _ in range(CODEBOOKS.scalar_steps):
             ends = np.searchsorted(ordered, (book[1:] + book[:-1]) / 2)
             starts, ends = np.concatenate(([0], ends)), np.concatenate((ends, [len(ordered)]))
             filled = ends > starts
@@ -44,8 +41,8 @@ def palette(vectors: np.ndarray, size: int) -> tuple[np.ndarray, np.ndarray]:
         return distinct, places.reshape(-1)
     points = torch.from_numpy(np.ascontiguousarray(vectors, np.float32))
     centres = torch.from_numpy(distinct[np.linspace(0, len(distinct) - 1, size).astype(int)])
-    sample = points[:: max(1, len(points) // (_SAMPLE * size))]
-    for _ in range(_VECTOR_STEPS):
+    sample = points[:: max(1, len(points) // (CODEBOOKS.sample * size))]
+    for _ in range(CODEBOOKS.vector_steps):
         nearest = _nearest(sample, centres)
         sums = torch.zeros_like(centres).index_add_(0, nearest, sample)
         counts = torch.bincount(nearest, minlength=len(centres))
@@ -59,12 +56,12 @@ def _nearest(points: torch.Tensor, centres: torch.Tensor) -> torch.Tensor:
 
     Distances share one buffer: made anew for each part, they left gigabytes of holes between small results.
     """
-    if points.shape[1] <= _FEW and bool(points.isfinite().all()):  # a tree refuses what is no number
+    if points.shape[1] <= CODEBOOKS.few and bool(points.isfinite().all()):  # a tree refuses what is no number
         from scipy.spatial import KDTree  # a quarter of a second, which a question has not to wait for
 
         return torch.from_numpy(KDTree(centres.numpy()).query(points.numpy())[1])
     norms = (centres**2).sum(1)
-    step = max(1, _PAIRS_AT_ONCE // len(centres))
+    step = max(1, CODEBOOKS.pairs_at_once // len(centres))
     distances, nearest = torch.empty(step, len(centres)), torch.empty(len(points), dtype=torch.long)
     for part, found in zip(points.split(step), nearest.split(step), strict=True):
         torch.addmm(norms, part, centres.T, alpha=-2, out=distances[: len(part)])

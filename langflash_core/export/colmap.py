@@ -18,12 +18,11 @@ from torch import Tensor
 
 from langflash_core.base.limits import TEXT, VIEWS
 from langflash_core.errors import SceneFileError
+from langflash_core.export.settings import COLMAP_TEXT
 from langflash_core.geometry.quaternions import quats_to_matrices
 
 Lens = tuple[Tensor, tuple[int, int]]
 """K (3, 3) float64 in pixels of photos of a size (width, height)."""
-STRAIGHT = 1e-3
-"""Distortion up to which photos count as straight."""
 _PINHOLES = {
     "SIMPLE_PINHOLE": (0, 0, 1, 2),
     "PINHOLE": (0, 1, 2, 3),
@@ -40,8 +39,6 @@ _NUMBERED = (
 )  # fmt: skip
 """Names of the models, and how many numbers they have, by their number in binary files."""
 _COUNTS = dict(_NUMBERED)
-_WORDS = 9  # of a line of images.txt before the name
-_LONGEST_NAME = 4096  # bytes
 
 
 @dataclass(frozen=True)
@@ -102,7 +99,7 @@ def check_pinhole(model: str, bends: list[float], what: str) -> None:
     """
     if model not in _PINHOLES:
         raise ValueError(f"{what} is of model {model}, which is no pinhole")
-    if not all(abs(number) <= STRAIGHT for number in bends):
+    if not all(abs(number) <= COLMAP_TEXT.straight for number in bends):
         raise ValueError(f"{what} of model {model} bends straight lines")
 
 
@@ -117,10 +114,10 @@ def _split(line: str, count: int) -> list[str]:
     Args:
         count: of words that are expected; a name behind them keeps its commas and blanks.
     """
-    words = line.split(maxsplit=count if count == _WORDS else -1)
+    words = line.split(maxsplit=count if count == COLMAP_TEXT.words else -1)
     if len(words) >= count:
         return [*(word.rstrip(",").replace(",", ".") for word in words[:count]), *words[count:]]
-    return re.split(r"\s*,\s*|\s+", line.strip(), maxsplit=count if count == _WORDS else 0)
+    return re.split(r"\s*,\s*|\s+", line.strip(), maxsplit=count if count == COLMAP_TEXT.words else 0)
 
 
 def _lens(number: str, model: str, size: list[str] | list[int], params: list[str] | list[float]) -> Lens:
@@ -142,9 +139,9 @@ def _photos(lines: list[str], lenses: dict[str, Lens]) -> Iterator[Seen]:
         if after_photo and _is_points(line, lenses):
             after_photo = False
             continue
-        words = _split(line, _WORDS)
-        if len(words) != _WORDS + 1:
-            raise ValueError(f"a line of images.txt has {len(words)} words, not {_WORDS + 1}")
+        words = _split(line, COLMAP_TEXT.words)
+        if len(words) != COLMAP_TEXT.words + 1:
+            raise ValueError(f"a line of images.txt has {len(words)} words, not {COLMAP_TEXT.words + 1}")
         numbers = [float(word) for word in words[1:8]]
         yield Seen(words[9].strip(), _viewmat(numbers), lenses[words[8]])
         after_photo = True
@@ -153,11 +150,12 @@ def _photos(lines: list[str], lenses: dict[str, Lens]) -> Iterator[Seen]:
 def _is_points(line: str, lenses: dict[str, Lens]) -> bool:
     """Whether a line behind one of a photo is its points: numbers alone, and not those of a photo whose name
     is a number. Of long lines the beginning and the end are looked at."""
-    words = _split(line, _WORDS)
-    behind = [*words[_WORDS:], ""][0]
+    words = _split(line, COLMAP_TEXT.words)
+    behind = [*words[COLMAP_TEXT.words :], ""][0]
     try:
         numbers = [
-            float(word) for word in (*words[:_WORDS], *behind[:40].split()[:1], *behind[-40:].split()[-1:])
+            float(word)
+            for word in (*words[: COLMAP_TEXT.words], *behind[:40].split()[:1], *behind[-40:].split()[-1:])
         ]
     except ValueError:
         return False
@@ -203,7 +201,7 @@ class _Bytes:
 
     def text(self) -> str:
         """Up to a zero byte."""
-        end = self._content.index(b"\0", self._at, self._at + _LONGEST_NAME)
+        end = self._content.index(b"\0", self._at, self._at + COLMAP_TEXT.longest_name)
         start, self._at = self._at, end + 1
         return self._content[start:end].decode("utf-8")
 

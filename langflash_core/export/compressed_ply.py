@@ -21,12 +21,11 @@ from langflash_core.errors import SceneFileError
 from langflash_core.export.antialiased import ply_comments, ply_model
 from langflash_core.export.packing import check_some, from_smallest_three, morton_order, smallest_three
 from langflash_core.export.ply import HEADER_END, bytes_of, only_blanks, read_elements, read_ply
+from langflash_core.export.settings import CHUNKS
 from langflash_core.export.stored import Gathering, Rows, parts, to_scene
 from langflash_core.geometry.harmonics import MAX_SHOWN_DEGREE, SH_C0
 from langflash_core.types import Gaussians, Scene
 
-_CHUNK = 256  # Gaussians
-_AT_ONCE = 256  # chunks
 _BOUNDS = tuple(
     f"{end}_{name}"
     for names in (("x", "y", "z"), ("scale_x", "scale_y", "scale_z"), ("r", "g", "b"))
@@ -36,8 +35,6 @@ _BOUNDS = tuple(
 _WORDS = ("packed_position", "packed_rotation", "packed_scale", "packed_color")
 _ELEMENTS = ("chunk", "vertex", "sh")
 _DEGREES = {0: 0, 9: 1, 24: 2, 45: 3}  # by how many f_rest there are
-_SH_SPAN = 8.0
-_WIDEST = 20.0  # log scales are written within this of 0
 _MARK = re.compile(rb"\nproperty\s+\S+\s+packed_position(?!\S)")
 _REMEDY = "save it again, or name an uncompressed .ply"
 
@@ -73,7 +70,7 @@ def read_compressed_ply(path: Path) -> Scene:
         num_rest = _check_elements(places, path.name)
         count = places["vertex"][1]
         gathering = Gathering(count, 1 + num_rest // 3, path.name)
-        for first in range(0, count, _AT_ONCE * _CHUNK):
+        for first in range(0, count, CHUNKS.at_once * CHUNKS.size):
             gathering.add(_rows(stream, places, first, num_rest))
     return to_scene(gathering, path.name, [], logs=True, logits=False, model=ply_model(path))
 
@@ -113,22 +110,22 @@ def _check_elements(places: dict[str, tuple[int, int, np.dtype]], name: str) -> 
     names_hold = all(f"f_rest_{index}" in (rest.names or ()) for index in range(num_rest))
     if num_rest not in _DEGREES or not names_hold or (num_rest and rest_count != count):
         raise SceneFileError(f"{name} has harmonics that do not fit its Gaussians; {_REMEDY}")
-    if chunks != -(-count // _CHUNK):
+    if chunks != -(-count // CHUNKS.size):
         raise SceneFileError(f"{name} has {chunks:,} chunks for {count:,} Gaussians; {_REMEDY}")
     return num_rest
 
 
 def _rows(stream, places: dict[str, tuple[int, int, np.dtype]], first: int, num_rest: int) -> Rows:
-    """`_AT_ONCE` chunks of Gaussians: log scales, opacities in [0, 1]."""
+    """`CHUNKS.at_once` chunks of Gaussians: log scales, opacities in [0, 1]."""
 
     def some(name: str, skip: int, most: int) -> np.ndarray:
         start, count, row = places[name]
         stream.seek(start + skip * row.itemsize)
         return np.fromfile(stream, row, min(most, count - skip))
 
-    words = some("vertex", first, _AT_ONCE * _CHUNK)
-    chunks = some("chunk", first // _CHUNK, _AT_ONCE)
-    own = np.arange(len(words)) // _CHUNK
+    words = some("vertex", first, CHUNKS.at_once * CHUNKS.size)
+    chunks = some("chunk", first // CHUNKS.size, CHUNKS.at_once)
+    own = np.arange(len(words)) // CHUNKS.size
 
     def between(names: tuple[str, ...], shares: np.ndarray) -> np.ndarray:
         low, high = (np.stack([chunks[name] for name in part], 1)[own] for part in (names[:3], names[3:]))
@@ -140,10 +137,10 @@ def _rows(stream, places: dict[str, tuple[int, int, np.dtype]], first: int, num_
     sh = np.empty((len(words), 1 + num_rest // 3, 3), np.float32)
     sh[:, 0] = ((between(_BOUNDS[12:], colours[:, :3]) if coloured else colours[:, :3]) - 0.5) / SH_C0
     if num_rest:
-        stored = some("sh", first, _AT_ONCE * _CHUNK)
+        stored = some("sh", first, CHUNKS.at_once * CHUNKS.size)
         rest = np.stack([stored[f"f_rest_{index}"] for index in range(num_rest)], 1).astype(np.float32)
         centred = np.where(rest == 0, 0, np.where(rest == 255, 1, (rest + 0.5) / 256)) - 0.5
-        sh[:, 1:] = (centred * _SH_SPAN).reshape(len(words), 3, -1).transpose(0, 2, 1)
+        sh[:, 1:] = (centred * CHUNKS.sh_span).reshape(len(words), 3, -1).transpose(0, 2, 1)
     return Rows(
         between(_BOUNDS[:6], _fields(words["packed_position"], (21, 11, 0), (11, 10, 11))),
         from_smallest_three(words["packed_rotation"] >> 30, (quats - 0.5) * np.sqrt(2)),
@@ -165,13 +162,13 @@ def _encoded(gaussians: Gaussians, comments: list[str]) -> Iterator[bytes]:
     order = morton_order(gaussians.means.detach().cpu().double().numpy())
     bounds, words, rest = [], [], []
     for part in parts(gaussians.map(lambda values: values.detach().cpu()[order])):
-        for first in range(0, len(part.means), _CHUNK):
-            chunk = Rows(*(values[first : first + _CHUNK] for values in part.all()))
+        for first in range(0, len(part.means), CHUNKS.size):
+            chunk = Rows(*(values[first : first + CHUNKS.size] for values in part.all()))
             low_high, packed = _packed(chunk)
             bounds.append(low_high)
             words.append(packed)
         flat = part.sh[:, 1:num_bases].transpose(0, 2, 1).reshape(len(part.means), num_rest)
-        rest.append(np.clip(np.trunc((flat / _SH_SPAN + 0.5) * 256), 0, 255).astype(np.uint8).tobytes())
+        rest.append(np.clip(np.trunc((flat / CHUNKS.sh_span + 0.5) * 256), 0, 255).astype(np.uint8).tobytes())
     lines = ["ply", "format binary_little_endian 1.0", "comment LangFlash", *comments]
     lines += [f"element chunk {len(bounds)}"]
     lines += [f"property float {name}" for name in _BOUNDS]
@@ -184,7 +181,7 @@ def _encoded(gaussians: Gaussians, comments: list[str]) -> Iterator[bytes]:
 
 def _packed(rows: Rows) -> tuple[bytes, bytes]:
     """Bounds and words of one chunk."""
-    scales = np.clip(np.log(rows.scales), -_WIDEST, _WIDEST)
+    scales = np.clip(np.log(rows.scales), -CHUNKS.widest, CHUNKS.widest)
     means, scales, colours = rows.means, scales, 0.5 + SH_C0 * rows.sh[:, 0]
     low_high, shares = [], []
     for values in (means, scales, colours):

@@ -17,6 +17,7 @@ from jaxtyping import Float
 from langflash_core.base.files import write_atomically
 from langflash_core.errors import PromptError
 from langflash_core.export.colours import label_colours, linear
+from langflash_core.export.settings import BOXES
 from langflash_core.geometry.fusion import Surface
 from langflash_core.types import QueryResult
 
@@ -24,8 +25,6 @@ if TYPE_CHECKING:
     import trimesh
 
 _TO_GLTF = np.diag([-1.0, -1.0, 1.0, 1.0])
-_OPACITY = 0.35  # what stands in the box stays visible
-_THINNEST = 1e-3  # of the longest side: a flat thing still gets a body
 _CORNERS = "_LINEAR"
 """An attribute of corners that becomes COLOR_0: trimesh writes that one in 8 bits alone."""
 
@@ -58,10 +57,10 @@ def write_boxes(boxes: Sequence[tuple[str, dict[str, Any]]], path: Path) -> None
     scene, colours = trimesh.Scene(base_frame="langflash"), linear(label_colours(len(boxes)) / 255)
     for name, box in boxes:
         size = np.asarray(box["size"], float)
-        body = trimesh.creation.box(np.maximum(size, _THINNEST * max(size.max(), _THINNEST)))
+        body = trimesh.creation.box(np.maximum(size, BOXES.thinnest * max(size.max(), BOXES.thinnest)))
         body.visual = _no_metal(name, alphaMode="BLEND")
         scene.add_geometry(body, node_name=name, geom_name=name, transform=_TO_GLTF @ _pose(box))
-    _write(scene, path, [[*colour.tolist(), _OPACITY] for colour in colours])
+    _write(scene, path, [[*colour.tolist(), BOXES.opacity] for colour in colours])
 
 
 def write_surfaces(surfaces: Sequence[tuple[str, Surface]], path: Path, scale: float = 1.0) -> None:

@@ -24,20 +24,11 @@ import numpy as np
 from langflash_core.base.files import write_atomically
 from langflash_core.errors import SceneFileError
 from langflash_core.export.colours import encoding_of, linear, with_srgb_colours
-from langflash_core.export.gltf_document import (
-    ARRAY,
-    FLOAT,
-    REMEDY,
-    TYPES,
-    USHORT,
-    WIDTHS,
-    Document,
-    extensions,
-    glb_head,
-)
+from langflash_core.export.gltf_document import REMEDY, TYPES, WIDTHS, Document, extensions, glb_head
 from langflash_core.export.language import packed_language, speaks, with_language
 from langflash_core.export.packing import check_some, placed, told, turned
-from langflash_core.export.stored import ROWS_AT_ONCE, Gathering, Rows, parts, to_scene
+from langflash_core.export.settings import GLTF_CODES, STORED
+from langflash_core.export.stored import Gathering, Rows, parts, to_scene
 from langflash_core.geometry.harmonics import MAX_SHOWN_DEGREE, SH_C0
 from langflash_core.geometry.turning import axes_matrix
 from langflash_core.types import Gaussians, Scene
@@ -188,9 +179,9 @@ def _stores_logarithms(document: Document, splats: _Splats) -> bool:
 
 
 def _parts(splats: _Splats) -> Iterator[slice | np.ndarray]:
-    """Which rows are drawn, `ROWS_AT_ONCE` at a time."""
-    for first in range(0, len(splats.some), ROWS_AT_ONCE):
-        some = splats.some[first : first + ROWS_AT_ONCE]
+    """Which rows are drawn, `STORED.rows_at_once` at a time."""
+    for first in range(0, len(splats.some), STORED.rows_at_once):
+        some = splats.some[first : first + STORED.rows_at_once]
         yield slice(some.start, some.stop) if isinstance(some, range) else some
 
 
@@ -242,9 +233,10 @@ def _encoded(gaussians: Gaussians, block: bytes) -> Iterator[bytes]:
     matrix = axes_matrix(_AXES)
     rows = [turned(part, matrix) for part in parts(gaussians)]
     columns: list[tuple[str, str, int]] = [
-        ("POSITION", "VEC3", FLOAT), ("COLOR_0", "VEC4", USHORT), (_NAMES["ROTATION"], "VEC4", FLOAT),
-        (_NAMES["SCALE"], "VEC3", FLOAT), (_NAMES["OPACITY"], "SCALAR", FLOAT),
-        *((name, "VEC3", FLOAT) for name in _harmonics(num_bases)),
+        ("POSITION", "VEC3", GLTF_CODES.float), ("COLOR_0", "VEC4", GLTF_CODES.ushort),
+        (_NAMES["ROTATION"], "VEC4", GLTF_CODES.float),
+        (_NAMES["SCALE"], "VEC3", GLTF_CODES.float), (_NAMES["OPACITY"], "SCALAR", GLTF_CODES.float),
+        *((name, "VEC3", GLTF_CODES.float) for name in _harmonics(num_bases)),
     ]  # fmt: skip
     document, length = _described(columns, rows, len(gaussians), len(block))
     padding = b"\0" * (-length % 4)
@@ -261,7 +253,7 @@ def _described(
     views, accessors, start = [], [], 0
     for index, (_, kind, component) in enumerate(columns):
         size = count * WIDTHS[kind] * np.dtype(TYPES[component]).itemsize
-        views.append({"buffer": 0, "byteOffset": start, "byteLength": size, "target": ARRAY})
+        views.append({"buffer": 0, "byteOffset": start, "byteLength": size, "target": GLTF_CODES.array})
         accessors.append({"bufferView": index, "componentType": component, "count": count, "type": kind})
         start += size
     accessors[0]["min"] = np.min([part.means.min(0) for part in rows], 0).tolist()

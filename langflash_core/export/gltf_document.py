@@ -20,13 +20,19 @@ import torch
 
 from langflash_core.base.limits import HEADER
 from langflash_core.errors import SceneFileError
+from langflash_core.export.settings import GLTF_CODES
 from langflash_core.geometry.quaternions import quats_to_matrices
 
-USHORT, UINT, FLOAT, ARRAY = 5123, 5125, 5126, 34962
-TYPES = {5120: "i1", 5121: "u1", 5122: "<i2", USHORT: "<u2", UINT: "<u4", FLOAT: "<f4"}
+TYPES = {
+    5120: "i1",
+    5121: "u1",
+    5122: "<i2",
+    GLTF_CODES.ushort: "<u2",
+    GLTF_CODES.uint: "<u4",
+    GLTF_CODES.float: "<f4",
+}
 WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
 REMEDY = "export it again, or name a .ply"
-_JSON, _BIN = 0x4E4F534A, 0x004E4942
 _MULTIPLYING, _HIDING = "EXT_mesh_gpu_instancing", "KHR_node_visibility"  # what nodes may say
 _Rows = slice | np.ndarray
 
@@ -35,8 +41,8 @@ def glb_head(document: dict[str, Any], length: int) -> bytes:
     """What a .glb begins with, up to the first byte of its buffer of `length`, a multiple of four, bytes."""
     text = json.dumps(document).encode()
     text += b" " * (-len(text) % 4)
-    head = struct.pack("<4sIIII", b"glTF", 2, 12 + 8 + len(text) + 8 + length, len(text), _JSON)
-    return head + text + struct.pack("<II", length, _BIN)
+    head = struct.pack("<4sIIII", b"glTF", 2, 12 + 8 + len(text) + 8 + length, len(text), GLTF_CODES.json)
+    return head + text + struct.pack("<II", length, GLTF_CODES.bin)
 
 
 class Document:
@@ -68,9 +74,9 @@ class Document:
             chunk = view[start + 8 : start + 8 + size]
             if len(chunk) < size:
                 raise ValueError(f"a chunk says {size:,} bytes, found {len(chunk):,}")
-            if kind == _JSON and text is None:
+            if kind == GLTF_CODES.json and text is None:
                 text = chunk
-            elif kind == _BIN and self._own is None:
+            elif kind == GLTF_CODES.bin and self._own is None:
                 self._own = chunk
             start += 8 + size
         if text is None:

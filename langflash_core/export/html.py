@@ -44,10 +44,11 @@ from langflash_core.export.page_columns import (
     table_column,
     weight_columns,
 )
-from langflash_core.export.png import DIM, GLOW
+from langflash_core.export.settings import PAINTING
 from langflash_core.geometry.cameras import invert_rigid
 from langflash_core.geometry.poses import from_view
-from langflash_core.scene.exposure import FAR, HERE, median_distance
+from langflash_core.scene.exposure import median_distance
+from langflash_core.scene.settings import EXPOSURE
 from langflash_core.scene.tour import Stop, read_tour
 from langflash_core.scene.world import turn_of
 from langflash_core.types import Scene
@@ -204,7 +205,12 @@ def _json_script(name: str, content: dict) -> str:
 def _constants() -> dict[str, str]:
     """What `show.frag` is given, as GLSL."""
     stops = ", ".join("vec3({})".format(", ".join(f"{part:.3f}" for part in stop)) for stop in HEAT_STOPS)
-    return {"GLOW": str(GLOW), "DIM": str(DIM), "STOPS": str(len(HEAT_STOPS)), "HEAT_STOPS": stops}
+    return {
+        "GLOW": str(PAINTING.glow),
+        "DIM": str(PAINTING.dim),
+        "STOPS": str(len(HEAT_STOPS)),
+        "HEAT_STOPS": stops,
+    }
 
 
 def _encoded(scene: Scene, phrases: Phrases | None) -> tuple[dict, bytes]:
@@ -269,7 +275,7 @@ def _views(scene: Scene, origin: Tensor) -> list[dict]:
 def _light(scene: Scene) -> dict:
     """What the light of a place is found by (`scene.exposure`); nothing of photos in one light."""
     light = scene.record.light
-    told = {**light, "distance": median_distance(scene), "far": FAR, "here": HERE}
+    told = {**light, "distance": median_distance(scene), "far": EXPOSURE.far, "here": EXPOSURE.here}
     return {"light": told} if light else {}
 
 

@@ -15,15 +15,13 @@ from pathlib import Path
 import numpy as np
 
 from langflash_core.errors import SceneFileError
-from langflash_core.export.stored import ROWS_AT_ONCE, Gathering, Rows, to_scene
+from langflash_core.export.settings import BUCKETS, STORED
+from langflash_core.export.stored import Gathering, Rows, to_scene
 from langflash_core.geometry.harmonics import SH_C0
 from langflash_core.types import Scene
 
-_HEADER, _SECTION = 4096, 1024  # bytes
 _MAIN = struct.Struct("<BBxxII4xIH14xff")  # version, sections room and used, count, level, range of SH
 _PART = struct.Struct("<IIIIfHxxI4xIIH")
-_SH_RANGE = 1.5  # of 8-bit harmonics, where the header says 0
-_STEPS = (1, 32767, 32767)  # of half a bucket, where the section says 0
 _REMEDY = "export it again, or name a .ply"
 
 
@@ -57,7 +55,7 @@ def read_ksplat(path: Path) -> Scene:
     size = path.stat().st_size
     if not size:
         raise SceneFileError(f"{path.name} is an empty file; {_REMEDY}")
-    if size < _HEADER:
+    if size < BUCKETS.header:
         raise SceneFileError(f"{path.name} is cut off or no .ksplat file; {_REMEDY}")
     with path.open("rb") as stream:
         major, minor, room, used, count, level, *limits = _MAIN.unpack(stream.read(_MAIN.size))
@@ -65,13 +63,13 @@ def read_ksplat(path: Path) -> Scene:
             found = f"version {major}.{minor}, compressed {level}"
             read = "this program reads version 0.1, compressed 0 to 2"
             raise SceneFileError(f"{path.name} is no .ksplat, or one of {found}, {read}; {_REMEDY}")
-        if _HEADER + room * _SECTION > size:
+        if BUCKETS.header + room * BUCKETS.section > size:
             raise SceneFileError(f"{path.name} is cut off: {room:,} sections have no room in it; {_REMEDY}")
-        stream.seek(_HEADER)
-        sections = _sections(stream.read(room * _SECTION), room, level, size, path.name)
+        stream.seek(BUCKETS.header)
+        sections = _sections(stream.read(room * BUCKETS.section), room, level, size, path.name)
         if not count or count != sum(section.count for section in sections):
             raise SceneFileError(f"{path.name} holds no Gaussians, or not as many as it says; {_REMEDY}")
-        low, high = limits[0] or -_SH_RANGE, limits[1] or _SH_RANGE
+        low, high = limits[0] or -BUCKETS.sh_range, limits[1] or BUCKETS.sh_range
         num_bases = (max(section.degree for section in sections) + 1) ** 2
         gathering = Gathering(count, num_bases, path.name)
         for section in sections:
@@ -84,15 +82,15 @@ def _sections(headers: bytes, room: int, level: int, size: int, name: str) -> li
     """Raises:
     SceneFileError: one does not fit into the file.
     """
-    sections, start = [], _HEADER + room * _SECTION
+    sections, start = [], BUCKETS.header + room * BUCKETS.section
     for index in range(room):
-        if not any(headers[index * _SECTION : (index + 1) * _SECTION]):
+        if not any(headers[index * BUCKETS.section : (index + 1) * BUCKETS.section]):
             continue  # room that was not needed
-        values = _PART.unpack_from(headers, index * _SECTION)
+        values = _PART.unpack_from(headers, index * BUCKETS.section)
         count, most, capacity, buckets, side, bucket_bytes, steps, full, partial, degree = values
         section = _Section(
-            count, most, capacity, buckets, side, bucket_bytes, steps or _STEPS[level], full, partial, degree,
-            start,
+            count, most, capacity, buckets, side, bucket_bytes,
+            steps or BUCKETS.steps[level], full, partial, degree, start,
         )  # fmt: skip
         if degree > 3:
             raise SceneFileError(
@@ -127,8 +125,8 @@ def _rows(stream, section: _Section, level: int, limits: tuple[float, float], nu
     centres = _centres(stream, section) if level else None
     row = _row(level, section.degree)
     stream.seek(section.rows_start)
-    for first in range(0, section.count, ROWS_AT_ONCE):
-        rows = np.fromfile(stream, row, min(ROWS_AT_ONCE, section.count - first))
+    for first in range(0, section.count, STORED.rows_at_once):
+        rows = np.fromfile(stream, row, min(STORED.rows_at_once, section.count - first))
         means = rows["mean"].astype(np.float32)
         if centres is not None:
             own = centres[first : first + len(rows)]

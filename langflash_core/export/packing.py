@@ -11,13 +11,11 @@ import numpy as np
 import torch
 
 from langflash_core.errors import OutputError, SceneFileError
+from langflash_core.export.settings import PACKING
 from langflash_core.export.stored import Rows
 from langflash_core.geometry.turning import axes_matrix, turned_quats, turned_sh
 from langflash_core.types import Gaussians
 
-MOST_SHRINKING = 1032  # times that deflate can shrink anything (zlib's documentation)
-_EVEN = 1e-3  # relative: how alike the scales of a node's axes must be
-_WINDOW = 1 << 23  # bytes that a zstd packer looks back at most, where the content is no longer
 _NO_ZSTD = "zstd is not installed; pip install 'langflash[formats]'"
 _OTHERS = np.array([[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]])  # entries but the largest, in order
 
@@ -45,7 +43,7 @@ def placed(rows: Rows, place: np.ndarray, axes: str) -> Rows:
         raise ValueError("a node's place is not finite")
     linear, ours = place[:3, :3], axes_matrix(axes).T
     size = float(np.cbrt(abs(np.linalg.det(linear))))
-    if not size > 0 or np.abs(linear.T @ linear / size**2 - np.eye(3)).max() > _EVEN:
+    if not size > 0 or np.abs(linear.T @ linear / size**2 - np.eye(3)).max() > PACKING.even:
         raise ValueError("a node stretches its Gaussians unevenly")
     means, scales = ((values * size).astype(np.float32) for values in (rows.means, rows.scales))
     sized = Rows(means, rows.quats, scales, rows.opacities, rows.sh)
@@ -147,7 +145,7 @@ def zstd_inflated(content: bytes, size: int, name: str) -> bytes:
         if own is not None:
             plain = own.ZstdDecompressor().decompress(content, size + 1)
         else:
-            unpacker = module.ZstdDecompressor(max_window_size=max(size, _WINDOW))
+            unpacker = module.ZstdDecompressor(max_window_size=max(size, PACKING.window))
             plain = unpacker.stream_reader(content, read_across_frames=False).read(size + 1)
     except module.ZstdError as error:
         raise SceneFileError(f"{name} is damaged: it cannot be unpacked; export or copy it again") from error

@@ -15,15 +15,9 @@ from jaxtyping import Bool, Integer
 from torch import Tensor
 
 from langflash_core.export.quantised import quantised
+from langflash_core.export.settings import COLUMNS
 from langflash_core.rig.projected import project_points
 from langflash_core.types import Scene
-
-MOST_WEIGHTS = 4  # of a Gaussian; `langflash bench` says what the others are worth
-PLACE_STEPS = (32, 32, 4000)
-"""Steps of a pixel across and down, of the photo as the network saw it, and of the logarithm of depth: a
-sixtyfourth of a pixel and an eighthousandth of the depth are lost, which another photo sees from a tenth of
-the depth aside as less than a hundredth of a pixel."""
-_NEAREST = 1e-3  # scene units; what is nearer to its photo, or behind it, has no place in it
 
 
 @dataclass(frozen=True)
@@ -74,7 +68,9 @@ def gaussian_columns(scene: Scene, origin: Tensor) -> tuple[dict, list[Column]]:
 def weight_columns(scene: Scene) -> list[Column]:
     """The largest weights of each Gaussian, of 255 in sum."""
     semantics = scene.semantics
-    values, places = semantics.weight_values.cpu().topk(min(MOST_WEIGHTS, semantics.weight_ids.shape[1]), 1)
+    values, places = semantics.weight_values.cpu().topk(
+        min(COLUMNS.most_weights, semantics.weight_ids.shape[1]), 1
+    )
     ids = semantics.weight_ids.cpu().gather(1, places).numpy()
     shares = torch.nan_to_num(values / values.sum(1, keepdim=True).clamp_min(1e-9)).double().numpy()
     steps = np.round(255 * shares).astype(int)
@@ -139,15 +135,15 @@ def layered_columns(scene: Scene, origin: Tensor) -> tuple[dict, list[Column]]:
 def _places(
     scene: Scene, view: int, rows: Bool[Tensor, " N"]
 ) -> tuple[Integer[np.ndarray, " 3"], Integer[np.ndarray, "n 3"]] | None:
-    """Pixel x, y and the logarithm of depth in a photo of some Gaussians, in `PLACE_STEPS`: the lowest of
-    each, and what is above it, in 16 bits; None where one has no place there."""
+    """Pixel x, y and the logarithm of depth in a photo of some Gaussians, in `COLUMNS.place_steps`: the
+    lowest of each, and what is above it, in 16 bits; None where one has no place there."""
     points = scene.gaussians.means[rows.to(scene.gaussians.means.device)].double().cpu()
     camera = scene.viewmats[view].double().cpu(), scene.Ks[view].double().cpu()
     width, height = scene.view_size
     there = project_points(points.T, *camera, (height, width))
-    if not bool((there.z > _NEAREST).all()):
+    if not bool((there.z > COLUMNS.nearest).all()):
         return None
-    steps = np.round(torch.stack((there.x, there.y, there.z.log()), 1).numpy() * PLACE_STEPS)
+    steps = np.round(torch.stack((there.x, there.y, there.z.log()), 1).numpy() * COLUMNS.place_steps)
     lowest = steps.min(0)
     above = steps - lowest
     return (lowest.astype(int), above.astype(int)) if above.max() < 1 << 16 else None

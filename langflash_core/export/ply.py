@@ -33,7 +33,8 @@ from langflash_core.export.ply_numbers import (
     shift_line,
 )
 from langflash_core.export.ply_numbers import REMEDY as _REMEDY
-from langflash_core.export.stored import ANTIALIASED, ROWS_AT_ONCE, Gathering, Rows, logit, parts, to_scene
+from langflash_core.export.settings import PLY_TEXT, STORED
+from langflash_core.export.stored import ANTIALIASED, Gathering, Rows, logit, parts, to_scene
 from langflash_core.geometry.harmonics import MAX_SHOWN_DEGREE
 from langflash_core.types import Gaussians, Scene
 
@@ -51,11 +52,8 @@ _TYPES = {
     **dict.fromkeys(("double", "float64"), "f8"),
 }
 _ORDERS = {"binary_little_endian": "<", "binary_big_endian": ">"}
-_MAX_HEADER = 1 << 16  # bytes; 3DGS headers have about 1,500
 HEADER_END = re.compile(rb"\nend_header[ \t]*\r?\n")
 _OWN = "stored as logit opacity, log scales"  # a comment that leaves nothing to guess
-_BLANKS = 16  # bytes of white space behind the last element, which are no damage
-_TOO_WIDE = 0.05  # of the scene: no capture is made of Gaussians that large
 
 
 @dataclass(frozen=True)
@@ -86,11 +84,11 @@ def read_ply(path: Path) -> Scene:
         gathering = Gathering(layout.count, num_bases, path.name)
         stream.seek(0)
         head = stream.read(layout.start)
-        rows = np.fromfile(stream, layout.row, min(ROWS_AT_ONCE, layout.count))
+        rows = np.fromfile(stream, layout.row, min(STORED.rows_at_once, layout.count))
         numbers = numbers_of(rows, head, path.name)
         stream.seek(layout.start)
-        for first in range(0, layout.count, ROWS_AT_ONCE):
-            rows = np.fromfile(stream, numbers.row, min(ROWS_AT_ONCE, layout.count - first))
+        for first in range(0, layout.count, STORED.rows_at_once):
+            rows = np.fromfile(stream, numbers.row, min(STORED.rows_at_once, layout.count - first))
             gathering.add(_filtered(_columns(rows, num_bases, numbers), rows))
     model = ANTIALIASED if filter_of(layout.row.names) else ply_model(path)
     scene = _activated(gathering, numbers, path.name, layout, model)
@@ -178,20 +176,23 @@ def read_elements(stream: BinaryIO, name: str) -> tuple[str, list["_Element"], i
     Raises:
         SceneFileError: it is no binary PLY.
     """
-    head = stream.read(_MAX_HEADER)
+    head = stream.read(PLY_TEXT.max_header)
     if not head:
         raise SceneFileError(f"{name} is an empty file; {_REMEDY}")
     if not re.match(rb"ply\s*\n", head):
         raise SceneFileError(f"{name} is not a PLY file, whatever its name says; {_REMEDY}")
     ended = HEADER_END.search(head)
     if ended is None:
-        state = "cut off inside its header" if len(head) < _MAX_HEADER else "damaged: its header does not end"
+        state = (
+            "cut off inside its header"
+            if len(head) < PLY_TEXT.max_header
+            else "damaged: its header does not end"
+        )
         raise SceneFileError(f"{name} is {state}; {_REMEDY}")
     lines = [line.split() for line in head[: ended.start()].decode("latin-1").splitlines()]
     return *_elements(lines, name), ended.end(), _OWN.encode() in head[: ended.start()]
 
 
-_DIGITS = 18  # of a count; int() itself refuses some thousand with an error of its own
 _Element = tuple[str, int, list[tuple[str, str]]]
 
 
@@ -206,7 +207,7 @@ def _elements(lines: list[list[str]], name: str) -> tuple[str, list[_Element]]:
                 order = _ORDERS[kind]
             case ["element", element, _] if element in [name for name, *_ in elements]:
                 raise SceneFileError(f"{name} has two elements {element}; {_REMEDY}")
-            case ["element", element, count] if count.isdecimal() and len(count) <= _DIGITS:
+            case ["element", element, count] if count.isdecimal() and len(count) <= PLY_TEXT.digits:
                 elements.append((element, int(count), []))
             case ["property", "list", *_, field] if elements:
                 elements[-1][2].append(("list", field))
@@ -262,8 +263,8 @@ def only_blanks(path: Path, end: int) -> bool:
     """Whether nothing but a little white space, as writers of text leave it, lies behind byte `end`."""
     with path.open("rb") as stream:
         stream.seek(end)
-        after = stream.read(_BLANKS + 1)
-    return len(after) <= _BLANKS and not after.strip()
+        after = stream.read(PLY_TEXT.blanks + 1)
+    return len(after) <= PLY_TEXT.blanks and not after.strip()
 
 
 def _columns(rows: np.ndarray, num_bases: int, numbers: Numbers) -> Rows:
@@ -293,4 +294,4 @@ def _looks_linear(stored: Rows) -> bool:
         return False
     low, high = np.percentile(stored.means, (5, 95), axis=0)
     extent = float(np.linalg.norm(high - low))
-    return math.exp(min(float(np.median(stored.scales)), 80.0)) > _TOO_WIDE * extent
+    return math.exp(min(float(np.median(stored.scales)), 80.0)) > PLY_TEXT.too_wide * extent

@@ -18,6 +18,7 @@ from numpy.lib.recfunctions import structured_to_unstructured
 from langflash_core.base.records import Shift, told_shift
 from langflash_core.errors import SceneFileError
 from langflash_core.export.antialiased import filter_of
+from langflash_core.export.settings import PLY_NUMBERS
 from langflash_core.export.stored import Rows
 from langflash_core.geometry.harmonics import SH_C0
 
@@ -30,11 +31,6 @@ REMEDY = "export it again as a binary 3D Gaussian Splatting .ply"
 _OWN = frozenset((*MEANS, *DC, "opacity", *SCALES, *QUATS, "filter_3D"))
 _RGB = ("red", "green", "blue")
 _TOLD = re.compile(rb"\ncomment LangFlash: shift (\S+) (\S+) (\S+)\r?\n")
-_THIN = 1e-6  # of the third axis of flat Gaussians
-_NORMS = (1 / 16, 16.0)  # of quaternions as trainers leave them; whole numbers read as halves are all over
-_MOST = 0.9  # share of rows that make sense as halves
-_BLUR = 0.02  # of a Gaussian's size: a step of float32 that is smaller is not seen
-_FAR = 4.0  # times the scene's width: nearer to 0, a shift would save no digit
 
 
 @dataclass(frozen=True)
@@ -75,7 +71,7 @@ class Numbers:
             SceneFileError: colours that are neither in [0, 1] nor in [0, 255].
         """
         if self.flat:
-            stored.scales[:, 2] = math.log(_THIN) if logs else _THIN
+            stored.scales[:, 2] = math.log(PLY_NUMBERS.thin) if logs else PLY_NUMBERS.thin
         if self.rgb and len(stored.sh):
             most = _brightest(stored.sh[:, 0], {self.row[field].name for field in _RGB}, name)
             stored.sh[:, 0] = (stored.sh[:, 0] / np.float32(most) - 0.5) / SH_C0
@@ -95,7 +91,7 @@ def numbers_of(rows: np.ndarray, head: bytes, name: str) -> Numbers:
     rows = rows.view(row)
     numbers = Numbers(row, None, SCALES[2] not in names, DC[0] not in names, said)
     if numbers.flat:
-        said = (*said, f"Its Gaussians are flat (no scale_2); their third axis is {_THIN:g}.")
+        said = (*said, f"Its Gaussians are flat (no scale_2); their third axis is {PLY_NUMBERS.thin:g}.")
     shift = _shift(rows, head)
     if shift is not None and all(row[field].itemsize < 8 for field in MEANS):
         step = float(np.spacing(np.float32(max(map(abs, shift)))))
@@ -159,7 +155,9 @@ def _sensible(rows: np.ndarray, own: list[str]) -> bool:
     """Whether nearly all rows are finite and have a quaternion of some usual length."""
     finite = np.isfinite(block(rows, tuple(own))).all(1)
     norms = np.linalg.norm(block(rows[finite], QUATS, np.float64), axis=1)
-    return float(((norms > _NORMS[0]) & (norms < _NORMS[1])).sum()) >= _MOST * len(rows)
+    return float(
+        ((norms > PLY_NUMBERS.norms[0]) & (norms < PLY_NUMBERS.norms[1])).sum()
+    ) >= PLY_NUMBERS.most * len(rows)
 
 
 def _shift(rows: np.ndarray, head: bytes) -> Shift | None:
@@ -180,7 +178,7 @@ def _shift(rows: np.ndarray, head: bytes) -> Shift | None:
     farthest, logs = float(np.abs(centre).max()), float(np.median(scales[usable]))
     size = logs if float(scales[usable].min()) > 0 else math.exp(min(logs, 80.0))
     step = farthest * float(np.finfo(np.float32).eps)
-    if step < _BLUR * size or farthest < _FAR * float(np.linalg.norm(high - low)):
+    if step < PLY_NUMBERS.blur * size or farthest < PLY_NUMBERS.far * float(np.linalg.norm(high - low)):
         return None
     x, y, z = np.round(centre).tolist()
     return (x, y, z) if any((x, y, z)) else None

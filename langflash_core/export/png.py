@@ -13,14 +13,12 @@ from torch import Tensor
 from langflash_core.base.colormaps import HeatColours
 from langflash_core.base.files import write_atomically
 from langflash_core.export.colours import heat, label_colours
+from langflash_core.export.settings import PAINTING
 from langflash_core.scene.gaps import filled
 from langflash_core.types import LUMA, Frame, QueryResult
 
 USUAL = HeatColours()
 RANGES = {"cosine": (-1.0, 1.0), "relevancy": (0.0, 1.0)}
-GLOW = 0.7  # share of the heat colour where the photo is white, as in the window
-LABEL_OPACITY = 0.6  # of a phrase's colour over the view, as in the window
-DIM = 0.6  # brightness of the photo where nothing was found
 
 
 def write_rgb(path: Path, rgb: Tensor) -> None:
@@ -98,7 +96,7 @@ def heat_over(
     glow = ((strength - (neutral + threshold) / 2) / (threshold - neutral)).clamp(0, 1)[..., None]
     first, last = colours.ends(threshold, high)
     shades = heat((strength - first) / max(last - first, 1e-6), colours.colormap)
-    dimmed = DIM * (0.7 * grey + 0.3 * view)
+    dimmed = PAINTING.dim * (0.7 * grey + 0.3 * view)
     lit = torch.lerp(view, shades, glow_share(grey))
     return dimmed * (1 - glow) + lit * glow
 
@@ -106,7 +104,7 @@ def heat_over(
 def glow_share(grey: Tensor) -> Tensor:
     """How much of a heat colour covers a photo of this brightness: all where it is dark and has nothing to
     show, or what is found in a dark room would hardly be seen."""
-    return GLOW + (1 - GLOW) * (1 - grey) ** 2
+    return PAINTING.glow + (1 - PAINTING.glow) * (1 - grey) ** 2
 
 
 def write_labels(path: Path, labels: Tensor, names: Sequence[str]) -> None:
@@ -167,7 +165,9 @@ def label_picture(result: QueryResult) -> np.ndarray:
     colours = np.concatenate((np.zeros((1, 3)), label_colours(len(result.answers)) / 255))
     frame = result.frame
     rgb = filled(frame.rgb.detach().cpu().float(), frame.alphas.detach().cpu().float()).clamp(0, 1)
-    coloured = (1 - LABEL_OPACITY) * rgb + LABEL_OPACITY * torch.from_numpy(colours).float()[labels]
+    coloured = (1 - PAINTING.label_opacity) * rgb + PAINTING.label_opacity * torch.from_numpy(
+        colours
+    ).float()[labels]
     return to_8bit(torch.where((labels > 0)[..., None], coloured, 0.4 * rgb))
 
 

@@ -14,11 +14,9 @@ from torch import Tensor
 
 from langflash_core.export.codebooks import palette, scalar_codebook
 from langflash_core.export.packing import smallest_three
+from langflash_core.export.settings import QUANTISING
 from langflash_core.geometry.harmonics import MAX_SHOWN_DEGREE
 from langflash_core.types import Gaussians
-
-_BOOK, _PALETTE = 256, 8192
-_STEPS = 65535  # of positions
 
 
 @dataclass(frozen=True)
@@ -65,12 +63,12 @@ def quantised(gaussians: Gaussians, means: Tensor | None = None) -> Quantised:
     lowest, highest = logs.min(0), logs.max(0)
     span = np.where(highest > lowest, highest - lowest, 1)
     largest, others = smallest_three(quats)
-    scale_book, scale_places = scalar_codebook(np.log(scales), _BOOK)
-    colour_book, colour_places = scalar_codebook(sh[:, 0], _BOOK)
+    scale_book, scale_places = scalar_codebook(np.log(scales), QUANTISING.book)
+    colour_book, colour_places = scalar_codebook(sh[:, 0], QUANTISING.book)
     return Quantised(
         lowest=lowest,
         highest=highest,
-        steps=np.round((logs - lowest) / span * _STEPS).astype(int),
+        steps=np.round((logs - lowest) / span * QUANTISING.steps).astype(int),
         largest=largest,
         turns=np.clip(np.round((others * math.sqrt(2) * 0.5 + 0.5) * 255), 0, 255).astype(int),
         scale_book=scale_book,
@@ -84,6 +82,6 @@ def quantised(gaussians: Gaussians, means: Tensor | None = None) -> Quantised:
 
 def _palette(rest: np.ndarray) -> Palette:
     """Of coefficients (n, B, 3)."""
-    entries, labels = palette(rest.reshape(len(rest), -1), _PALETTE)
-    book, places = scalar_codebook(entries, _BOOK)
+    entries, labels = palette(rest.reshape(len(rest), -1), QUANTISING.palette)
+    book, places = scalar_codebook(entries, QUANTISING.book)
     return Palette(book, places.reshape(len(entries), rest.shape[1], 3), labels)

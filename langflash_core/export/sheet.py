@@ -7,23 +7,20 @@ import numpy as np
 from jaxtyping import UInt8
 from PIL import Image, ImageDraw, ImageFont
 
-_CAPTION = 18  # pixels above a picture
-_GAP = 2  # around it
-_WIDTH = 240  # of a tile, before the gap
-_LIGHT = (235, 235, 235)
+from langflash_core.export.settings import SHEET
 
 
 def captioned(picture: UInt8[np.ndarray, "H W 3"], text: str) -> UInt8[np.ndarray, "h w 3"]:
     """A picture under its caption, on black; what does not fit of the caption ends in dots."""
     height, width = picture.shape[:2]
-    cell = Image.new("RGB", (width + 2 * _GAP, height + _CAPTION + 2 * _GAP))
-    cell.paste(Image.fromarray(picture), (_GAP, _CAPTION))
+    cell = Image.new("RGB", (width + 2 * SHEET.gap, height + SHEET.caption + 2 * SHEET.gap))
+    cell.paste(Image.fromarray(picture), (SHEET.gap, SHEET.caption))
     font, draw = ImageFont.load_default(13), ImageDraw.Draw(cell)
     shown = text
-    while draw.textlength(shown, font) > width - _GAP and len(shown) > 1:
+    while draw.textlength(shown, font) > width - SHEET.gap and len(shown) > 1:
         text = text[:-1]
         shown = text.rstrip() + "..."
-    draw.text((2 * _GAP, 1), shown, fill=_LIGHT, font=font)
+    draw.text((2 * SHEET.gap, 1), shown, fill=SHEET.light, font=font)
     return np.asarray(cell)
 
 
@@ -46,5 +43,5 @@ def contact_sheet(
 def thumbnail(picture: UInt8[np.ndarray, "H W 3"]) -> UInt8[np.ndarray, "h w 3"]:
     """As large as a sheet shows it; one of that width stays as it is."""
     height, width = picture.shape[:2]
-    size = (_WIDTH, max(1, round(height * _WIDTH / width)))
+    size = (SHEET.width, max(1, round(height * SHEET.width / width)))
     return np.asarray(Image.fromarray(picture).resize(size, Image.Resampling.LANCZOS))

@@ -30,15 +30,10 @@ from langflash_core.base.picture_files import opened_picture
 from langflash_core.errors import OutputError, SceneFileError
 from langflash_core.export.packing import check_some, from_smallest_three, morton_order, told
 from langflash_core.export.quantised import Palette, quantised
-from langflash_core.export.stored import ANTIALIASED, PLAIN, ROWS_AT_ONCE, Gathering, Rows, to_scene
+from langflash_core.export.settings import SOG_LIMITS, STORED
+from langflash_core.export.stored import ANTIALIASED, PLAIN, Gathering, Rows, to_scene
 from langflash_core.types import Scene
 
-_BOOK, _ROW = 256, 64  # numbers, entries a row of the palette's picture
-_LARGEST_SIDE = 16383  # pixels of a WebP
-_TAGS = 252  # alpha of a rotation whose largest entry is the first
-_MOST_META = 1 << 20  # bytes of meta.json
-_MOST_PALETTE = 1 << 16  # entries that a label can name
-_SLACK = 1 << 16  # bytes and pixels that a picture may have more than it needs
 _DAMAGE = (
     OSError, ValueError, SyntaxError, LookupError, TypeError, AttributeError, ArithmeticError, RuntimeError,
     EOFError, zipfile.BadZipFile, zlib.error, struct.error,
@@ -74,7 +69,7 @@ def write_sog(scene: Scene, path: Path) -> None:
         OutputError: there is nothing to write, too much for one picture, or an unwritable path.
     """
     check_some(scene.gaussians, path)
-    if len(scene.gaussians) > _LARGEST_SIDE**2 // 2:
+    if len(scene.gaussians) > SOG_LIMITS.largest_side**2 // 2:
         raise OutputError(f"cannot write {path.name}: too many Gaussians for a SOG; name a .ply")
     files = _encoded(scene)
     if path.name.lower() == SOG_FOLDER:
@@ -117,13 +112,13 @@ def _read(name: str, open_file: _Opener) -> Scene:
     """Raises:
     SceneFileError: another version. Any of `_DAMAGE`: something does not fit.
     """
-    meta = json.loads(open_file(SOG_FOLDER, _MOST_META))
+    meta = json.loads(open_file(SOG_FOLDER, SOG_LIMITS.most_meta))
     if meta.get("version") != 2:
         raise SceneFileError(
             f"{name} is a SOG of version {meta.get('version', 1)!r}, this program reads version 2; {_REMEDY}"
         )
     count = meta["count"]
-    if not isinstance(count, int) or not 0 < count <= _LARGEST_SIDE**2:
+    if not isinstance(count, int) or not 0 < count <= SOG_LIMITS.largest_side**2:
         raise ValueError(f"its count is {count!r}")
     GAUSSIANS.check(count, name, SceneFileError)
 
@@ -131,7 +126,7 @@ def _read(name: str, open_file: _Opener) -> Scene:
         file = meta[part]["files"][index]
         if not isinstance(file, str) or Path(file).name != file:
             raise ValueError(f"it names a file {file!r}")
-        return _pixels(open_file(file, 8 * needed + _SLACK), needed, file)
+        return _pixels(open_file(file, 8 * needed + SOG_LIMITS.slack), needed, file)
 
     books = {part: _book(meta[part]) for part in ("scales", "sh0")}
     lowest, highest = (np.array(meta["means"][end], np.float64).reshape(3) for end in ("mins", "maxs"))
@@ -140,8 +135,8 @@ def _read(name: str, open_file: _Opener) -> Scene:
     harmonics = _harmonics(meta["shN"], pixels, count) if meta.get("shN", {}).get("bands") else None
     num_bases = 1 if harmonics is None else 1 + harmonics[0].shape[1]
     gathering = Gathering(count, num_bases, name)
-    for first in range(0, count, ROWS_AT_ONCE):
-        some = slice(first, min(first + ROWS_AT_ONCE, count))
+    for first in range(0, count, STORED.rows_at_once):
+        some = slice(first, min(first + STORED.rows_at_once, count))
         whole = low[some, :3].astype(np.float64) + 256.0 * high[some, :3]
         logs = lowest + whole / 65535 * (highest - lowest)
         with np.errstate(over="ignore", invalid="ignore"):  # rows that are not finite stay out
@@ -160,7 +155,7 @@ def _pixels(content: bytes, needed: int, name: str) -> np.ndarray:
     """The first `needed` pixels (needed, 4) uint8 of a WebP."""
     with opened_picture(content, ("WEBP",)) as picture:
         area = picture.width * picture.height
-        if not needed <= area <= 2 * needed + _SLACK:
+        if not needed <= area <= 2 * needed + SOG_LIMITS.slack:
             raise ValueError(f"{name} has {area:,} pixels, expected about {needed:,}")
         return np.asarray(picture.convert("RGBA")).reshape(-1, 4)[:needed]
 
@@ -168,19 +163,19 @@ def _pixels(content: bytes, needed: int, name: str) -> np.ndarray:
 def _book(part: dict) -> np.ndarray:
     """256 numbers (256,) float32; those that are missing are 0, as readers of the format take them."""
     numbers = np.array([0.0 if number is None else number for number in part["codebook"]], np.float64)
-    book = np.zeros(_BOOK, np.float32)
-    book[: len(numbers)] = numbers.reshape(-1)[:_BOOK]
+    book = np.zeros(SOG_LIMITS.book, np.float32)
+    book[: len(numbers)] = numbers.reshape(-1)[: SOG_LIMITS.book]
     return book
 
 
 def _harmonics(part: dict, pixels: Callable[..., np.ndarray], count: int) -> tuple[np.ndarray, np.ndarray]:
     """Coefficients (k, S - 1, 3) of the palette, and the entry (n,) of each Gaussian."""
     bands, entries = part["bands"], part["count"]
-    if bands not in (1, 2, 3) or not isinstance(entries, int) or not 0 < entries <= _MOST_PALETTE:
+    if bands not in (1, 2, 3) or not isinstance(entries, int) or not 0 < entries <= SOG_LIMITS.most_palette:
         raise ValueError(f"its palette has {entries!r} entries of degree {bands!r}")
-    bases, rows = (bands + 1) ** 2 - 1, -(-entries // _ROW)
-    stored = pixels("shN", 0, rows * _ROW * bases)[:, :3]
-    coefficients = _book(part)[stored].reshape(rows * _ROW, bases, 3)[:entries]
+    bases, rows = (bands + 1) ** 2 - 1, -(-entries // SOG_LIMITS.row)
+    stored = pixels("shN", 0, rows * SOG_LIMITS.row * bases)[:, :3]
+    coefficients = _book(part)[stored].reshape(rows * SOG_LIMITS.row, bases, 3)[:entries]
     labels = pixels("shN", 1)[:, :2].astype(np.int64)
     places = labels[:, 0] | labels[:, 1] << 8
     # Labels beyond the palette mean no gloss, as readers of the format take them.
@@ -189,7 +184,7 @@ def _harmonics(part: dict, pixels: Callable[..., np.ndarray], count: int) -> tup
 
 def _quats(stored: np.ndarray) -> np.ndarray:
     """wxyz (n, 4) of pixels (n, 4); a tag that is none means no rotation."""
-    tags = stored[:, 3].astype(np.int64) - _TAGS
+    tags = stored[:, 3].astype(np.int64) - SOG_LIMITS.tags
     others = (stored[:, :3] / 255.0 * 2 - 1) * math.sqrt(0.5)
     quats = from_smallest_three(np.clip(tags, 0, 3), others)
     quats[tags < 0] = (1, 0, 0, 0)
@@ -203,7 +198,7 @@ def _encoded(scene: Scene) -> dict[str, bytes]:
     files = {
         "means_l.webp": _picture(stored.steps & 255),
         "means_u.webp": _picture(stored.steps >> 8),
-        "quats.webp": _picture(np.concatenate((stored.turns, _TAGS + stored.largest[:, None]), 1)),
+        "quats.webp": _picture(np.concatenate((stored.turns, SOG_LIMITS.tags + stored.largest[:, None]), 1)),
         "scales.webp": _picture(stored.scales),
         "sh0.webp": _picture(np.concatenate((stored.colours, stored.opacities[:, None]), 1)),
     }
@@ -230,11 +225,11 @@ def _encoded(scene: Scene) -> dict[str, bytes]:
 def _encoded_harmonics(harmonics: Palette) -> tuple[dict, dict[str, bytes]]:
     """The entry of meta.json and the two pictures of a palette."""
     count, bases, _ = harmonics.places.shape
-    rows, labels = -(-count // _ROW), harmonics.labels
-    stored = np.zeros((rows * _ROW, bases, 3), np.int64)
+    rows, labels = -(-count // SOG_LIMITS.row), harmonics.labels
+    stored = np.zeros((rows * SOG_LIMITS.row, bases, 3), np.int64)
     stored[:count] = harmonics.places
     files = {
-        "shN_centroids.webp": _picture(stored.reshape(-1, 3), _ROW * bases),
+        "shN_centroids.webp": _picture(stored.reshape(-1, 3), SOG_LIMITS.row * bases),
         "shN_labels.webp": _picture(np.stack((labels & 255, labels >> 8, np.zeros_like(labels)), 1)),
     }
     described = {

@@ -12,14 +12,13 @@ import numpy as np
 
 from langflash_core.base.files import write_atomically
 from langflash_core.errors import SceneFileError
-from langflash_core.export.stored import ROWS_AT_ONCE, Gathering, Rows, parts, to_scene
+from langflash_core.export.settings import SPLAT_BYTES, STORED
+from langflash_core.export.stored import Gathering, Rows, parts, to_scene
 from langflash_core.geometry.harmonics import SH_C0
 from langflash_core.types import Gaussians, Scene
 
 _ROW = np.dtype([("mean", "<f4", 3), ("scale", "<f4", 3), ("rgba", "u1", 4), ("quat", "u1", 4)])
 _REMEDY = "export it again, or name a .ply"
-_UNIT = (0.9, 1.1)  # norms of quaternions that were unit before they became bytes (error up to 1/64)
-_PLAUSIBLE = 0.5  # share of unit quaternions below which the bytes are something else
 
 
 def read_splat(path: Path) -> Scene:
@@ -39,16 +38,18 @@ def read_splat(path: Path) -> Scene:
     count = size // _ROW.itemsize
     gathering, unit = Gathering(count, 1, path.name), 0
     with path.open("rb") as stream:
-        for first in range(0, count, ROWS_AT_ONCE):
-            rows = np.fromfile(stream, _ROW, min(ROWS_AT_ONCE, count - first))
+        for first in range(0, count, STORED.rows_at_once):
+            rows = np.fromfile(stream, _ROW, min(STORED.rows_at_once, count - first))
             quats = rows["quat"].astype(np.float32) / 128 - 1
             norms = np.linalg.norm(quats, axis=1)
-            usual = (rows["scale"] >= 0).all(1) & (norms > _UNIT[0]) & (norms < _UNIT[1])
+            usual = (
+                (rows["scale"] >= 0).all(1) & (norms > SPLAT_BYTES.unit[0]) & (norms < SPLAT_BYTES.unit[1])
+            )
             unit += int(usual.sum())
             colours = rows["rgba"].astype(np.float32) / 255
             sh = ((colours[:, :3] - 0.5) / SH_C0)[:, None]
             gathering.add(Rows(rows["mean"], quats, rows["scale"], colours[:, 3], sh))
-    if unit < _PLAUSIBLE * count:
+    if unit < SPLAT_BYTES.plausible * count:
         raise SceneFileError(f"{path.name} is not a .splat file, whatever its name says; {_REMEDY}")
     return to_scene(gathering, path.name, [], logs=False, logits=False)
 

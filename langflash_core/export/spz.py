@@ -22,7 +22,6 @@ from langflash_core.base.files import write_atomically
 from langflash_core.base.formats import AXES
 from langflash_core.errors import OutputError, SceneFileError
 from langflash_core.export.packing import (
-    MOST_SHRINKING,
     check_some,
     from_smallest_three,
     has_zstd,
@@ -32,7 +31,8 @@ from langflash_core.export.packing import (
     zstd_inflated,
     zstd_packed,
 )
-from langflash_core.export.stored import ANTIALIASED, PLAIN, ROWS_AT_ONCE, Gathering, Rows, parts, to_scene
+from langflash_core.export.settings import PACKING, SPZ_FORMAT, STORED
+from langflash_core.export.stored import ANTIALIASED, PLAIN, Gathering, Rows, parts, to_scene
 from langflash_core.geometry.harmonics import MAX_SHOWN_DEGREE
 from langflash_core.geometry.turning import axes_matrix
 from langflash_core.scene.standing import on_its_head
@@ -40,18 +40,11 @@ from langflash_core.types import Gaussians, Scene
 
 _MAGIC = b"NGSP"
 _HEAD = struct.Struct("<4sIIBBBB")  # magic, version, count, degree, fractional bits, flags, streams
-_ZSTD_HEAD = 32  # bytes: _HEAD, the place of the table of contents, 12 spare ones
-_SMOOTHED, _EXTENDED = 1, 2  # flags
-_AXES_EXTENSION = 0xADBE0003
-_MOST_EXTENSIONS = 1 << 20  # bytes of versions 2 and 3, which do not say how many there are
 _STORED_AXES = "RUB"
 _ON_ITS_HEAD = (
     "The scene seems to stand on its head; if SuperSplat or splat-transform wrote it, read it with --axes "
     "rdf."
 )
-_COLOUR_SCALE = 0.15
-_SH_STEPS = (8, 16)  # of 256, degree 1 and above: 5 and 4 significant bits
-_MOST_BITS = 16  # of the fraction of a position; a scene 128 units wide keeps them all
 _REMEDY = "export it again, or name a .ply"
 
 
@@ -96,9 +89,9 @@ def read_spz(path: Path, *, axes: str | None = None) -> Scene:
     named = _named_axes(extensions, path.name)
     matrix = axes_matrix(named or axes or _STORED_AXES).T  # to ours
     gathering = Gathering(header.count, header.num_shown, path.name)
-    for first in range(0, header.count, ROWS_AT_ONCE):
-        gathering.add(turned(_rows(header, streams, slice(first, first + ROWS_AT_ONCE)), matrix))
-    model = ANTIALIASED if header.flags & _SMOOTHED else PLAIN
+    for first in range(0, header.count, STORED.rows_at_once):
+        gathering.add(turned(_rows(header, streams, slice(first, first + STORED.rows_at_once)), matrix))
+    model = ANTIALIASED if header.flags & SPZ_FORMAT.smoothed else PLAIN
     scene = to_scene(gathering, path.name, [], logs=True, logits=False, model=model)
     return scene.with_record(warnings=(*scene.record.warnings, *_of_axes(scene.gaussians, named, axes)))
 
@@ -118,8 +111,10 @@ def write_spz(scene: Scene, path: Path, *, version: int | None = None, axes: str
     if version is None:
         version = 4 if has_zstd() else 3
     header, streams = _encoded(scene.gaussians, version, path.name, axes or _STORED_AXES)
-    extensions = struct.pack("<III", _AXES_EXTENSION, 4, AXES.index(axes) + 1) if axes else b""
-    flags = (_SMOOTHED if scene.record.antialiased else 0) | (_EXTENDED if extensions else 0)
+    extensions = struct.pack("<III", SPZ_FORMAT.axes_extension, 4, AXES.index(axes) + 1) if axes else b""
+    flags = (SPZ_FORMAT.smoothed if scene.record.antialiased else 0) | (
+        SPZ_FORMAT.extended if extensions else 0
+    )
     fields = (header.version, header.count, header.degree, header.bits, flags)
     if version < 4:
         plain = _HEAD.pack(_MAGIC, *fields, 0) + b"".join(streams) + extensions
@@ -127,7 +122,9 @@ def write_spz(scene: Scene, path: Path, *, version: int | None = None, axes: str
     streams = [stream for stream in streams if stream]
     packed = [zstd_packed(stream) for stream in streams]
     table = b"".join(struct.pack("<QQ", len(p), len(s)) for p, s in zip(packed, streams, strict=True))
-    head = _HEAD.pack(_MAGIC, *fields, len(streams)) + struct.pack("<I12x", _ZSTD_HEAD + len(extensions))
+    head = _HEAD.pack(_MAGIC, *fields, len(streams)) + struct.pack(
+        "<I12x", SPZ_FORMAT.zstd_head + len(extensions)
+    )
     write_atomically(path, [head, extensions, table, *packed])
 
 
@@ -146,7 +143,7 @@ def _unzipped(content: bytes, name: str) -> tuple[_Header, list[bytes], bytes]:
     needed = sum(header.sizes())
     _check_shrinking(needed, len(content), name)
     after = (
-        _MOST_EXTENSIONS if header.flags & _EXTENDED else 1
+        SPZ_FORMAT.most_extensions if header.flags & SPZ_FORMAT.extended else 1
     )  # asked for, so that an end that is missing shows
     plain = inflated(content, _HEAD.size + needed + after, name, wbits=31)
     if len(plain) < _HEAD.size + needed:
@@ -175,7 +172,7 @@ def _unpacked(content: bytes, name: str) -> tuple[_Header, list[bytes], bytes]:
     sizes = [size for size in header.sizes() if size]
     table = int.from_bytes(content[_HEAD.size : _HEAD.size + 4], "little")
     start = table + 16 * len(sizes)
-    if header.streams != len(sizes) or table < _ZSTD_HEAD or start > len(content):
+    if header.streams != len(sizes) or table < SPZ_FORMAT.zstd_head or start > len(content):
         raise SceneFileError(f"{name} is cut off or damaged: its table of contents does not fit; {_REMEDY}")
     _check_shrinking(sum(sizes), len(content), name)
     streams = []
@@ -185,7 +182,11 @@ def _unpacked(content: bytes, name: str) -> tuple[_Header, list[bytes], bytes]:
         streams.append(zstd_inflated(content[start : start + packed], size, name))
         start += packed
     streams += [b""] * (len(header.sizes()) - len(streams))
-    return header, streams, content[_ZSTD_HEAD:table] if header.flags & _EXTENDED else b""
+    return (
+        header,
+        streams,
+        content[SPZ_FORMAT.zstd_head : table] if header.flags & SPZ_FORMAT.extended else b"",
+    )
 
 
 def _header(head: bytes, name: str) -> _Header:
@@ -207,7 +208,7 @@ def _check_shrinking(needed: int, found: int, name: str) -> None:
     """Raises:
     SceneFileError: no packer could have made so much so small.
     """
-    if needed > MOST_SHRINKING * found:
+    if needed > PACKING.most_shrinking * found:
         raise SceneFileError(
             f"{name} is damaged: it says to hold {needed:,} bytes and has {found:,}; {_REMEDY}"
         )
@@ -226,9 +227,9 @@ def _named_axes(extensions: bytes, name: str) -> str | None:
         if len(value) < size:
             raise SceneFileError(f"{name} has an extension {kind:#x} of {size:,} bytes, cut off; {_REMEDY}")
         number = int.from_bytes(value[:4], "little")
-        if kind == _AXES_EXTENSION and (size != 4 or number > len(AXES)):
+        if kind == SPZ_FORMAT.axes_extension and (size != 4 or number > len(AXES)):
             raise SceneFileError(f"{name} names axes {number}, this program knows 1 to 16; {_REMEDY}")
-        if kind == _AXES_EXTENSION and number:  # 0: unspecified
+        if kind == SPZ_FORMAT.axes_extension and number:  # 0: unspecified
             return AXES[number - 1]
         start += 8 + size
     return None
@@ -247,7 +248,7 @@ def _rows(header: _Header, streams: list[bytes], some: slice) -> Rows:
         np.frombuffer(stream, np.uint8).reshape(header.count, -1)[some] for stream in streams
     )
     sh = np.empty((len(places), header.num_shown, 3), np.float32)
-    sh[:, 0] = (colours / np.float32(255) - 0.5) / _COLOUR_SCALE
+    sh[:, 0] = (colours / np.float32(255) - 0.5) / SPZ_FORMAT.colour_scale
     sh[:, 1:] = (rest.reshape(len(places), -1, 3)[:, : header.num_shown - 1] - np.float32(128)) / 128
     return Rows(
         _fixed(places) / np.float32(1 << header.bits),
@@ -293,7 +294,9 @@ def _encoded(gaussians: Gaussians, version: int, name: str, axes: str) -> tuple[
             f"cannot write {name}: a Gaussian lies {furthest:.3g} away, a .spz ends at {1 << 23:,}; "
             "remove it, or name a .ply"
         )
-    bits = next(b for b in range(_MOST_BITS, -1, -1) if round(furthest * (1 << b)) < 1 << 23 or not b)
+    bits = next(
+        b for b in range(SPZ_FORMAT.most_bits, -1, -1) if round(furthest * (1 << b)) < 1 << 23 or not b
+    )
     degree = min(int(gaussians.sh.shape[1] ** 0.5) - 1, MAX_SHOWN_DEGREE)
     header = _Header(version, len(gaussians), degree, bits, 0, 0)
     matrix, columns = axes_matrix(axes), []
@@ -307,13 +310,13 @@ def _columns(rows: Rows, version: int, bits: int) -> tuple[bytes, ...]:
     whole = np.clip(np.round(rows.means.astype(np.float64) * (1 << bits)), -(1 << 23), (1 << 23) - 1)
     places = whole.astype("<i4").view(np.uint8).reshape(-1, 4)[:, :3]
     sh = np.round(rows.sh[:, 1:] * np.float32(128)) + 128
-    steps = np.where(np.arange(sh.shape[1]) < 3, *_SH_STEPS)[:, None]
+    steps = np.where(np.arange(sh.shape[1]) < 3, *SPZ_FORMAT.sh_steps)[:, None]
     # The lowest bits are zero for the packer's sake; 0 stays 128.
     rest = np.clip((sh + steps // 2) // steps * steps, 0, 255)
     return (
         places.tobytes(),
         _bytes(rows.opacities * 255),
-        _bytes((rows.sh[:, 0] * _COLOUR_SCALE + 0.5) * 255),
+        _bytes((rows.sh[:, 0] * SPZ_FORMAT.colour_scale + 0.5) * 255),
         _bytes((np.log(rows.scales) + 10) * 16),
         _three_bytes(rows.quats) if version == 2 else _signed_words(rows.quats),
         rest.astype(np.uint8).tobytes(),

@@ -13,16 +13,13 @@ import torch
 from langflash_core.base.limits import GAUSSIANS
 from langflash_core.base.memory import free_memory
 from langflash_core.errors import SceneFileError
+from langflash_core.export.settings import STORED
 from langflash_core.geometry.quaternions import unit_quats
 from langflash_core.scene.bare import bare_scene
 from langflash_core.types import Gaussians, Scene
 
-ROWS_AT_ONCE = 1 << 16  # 16 MB of a file with spherical harmonics of degree 3
-_SMALLEST, _LARGEST = 1e-30, 1e30  # of scales: beyond, float32 products vanish or overflow
-_COPIES = 2  # of all numbers, at most, while a file is opened: 10 million took 1.0 GB for 0.56 of their own
 PLAIN, ANTIALIASED, FLAT = "default", "antialiased", "2dgs"
 """What splats were trained as, in the words of SOG."""
-_OPAQUE = 1 - 1e-7  # its logit, 16.1, is the largest that is written: infinity breaks other readers
 
 
 @dataclass(frozen=True)
@@ -90,7 +87,7 @@ def _check_memory(most: int, num_bases: int, name: str) -> None:
     Raises:
         SceneFileError: too little is free for so many Gaussians.
     """
-    needed, free = 4 * most * (11 + 3 * num_bases) * _COPIES, free_memory()
+    needed, free = 4 * most * (11 + 3 * num_bases) * STORED.copies, free_memory()
     if free is not None and needed > free:
         sizes = f"take {needed / 1e9:.1f} GB to open, and {max(free, 0) / 1e9:.1f} GB are free"
         raise SceneFileError(
@@ -134,7 +131,7 @@ def to_scene(
     gaussians = Gaussians(
         means=torch.from_numpy(rows.means),
         quats=unit_quats(torch.from_numpy(rows.quats)),
-        scales=scales.clamp_(_SMALLEST, _LARGEST),
+        scales=scales.clamp_(STORED.smallest, STORED.largest),
         opacities=opacities.clamp_(0, 1),
         sh=torch.from_numpy(rows.sh),
     )
@@ -151,15 +148,15 @@ def _said_of(model: str) -> str:
 
 
 def parts(gaussians: Gaussians) -> Iterator[Rows]:
-    """Activated rows on the CPU, `ROWS_AT_ONCE` at a time."""
-    for first in range(0, len(gaussians), ROWS_AT_ONCE):
+    """Activated rows on the CPU, `STORED.rows_at_once` at a time."""
+    for first in range(0, len(gaussians), STORED.rows_at_once):
         fields = (gaussians.means, gaussians.quats, gaussians.scales, gaussians.opacities, gaussians.sh)
         yield Rows(
-            *(values[first : first + ROWS_AT_ONCE].detach().cpu().float().numpy() for values in fields)
+            *(values[first : first + STORED.rows_at_once].detach().cpu().float().numpy() for values in fields)
         )
 
 
 def logit(opacities: np.ndarray) -> np.ndarray:
     """Stored opacities, finite."""
-    inside = np.clip(opacities.astype(np.float64), 1 - _OPAQUE, _OPAQUE)
+    inside = np.clip(opacities.astype(np.float64), 1 - STORED.opaque, STORED.opaque)
     return np.log(inside / (1 - inside)).astype(np.float32)

@@ -22,7 +22,8 @@ from langflash_core.base.files import written_atomically
 from langflash_core.errors import OutputError, SceneFileError
 from langflash_core.export.colours import Encoding, encoding_of, with_srgb_colours
 from langflash_core.export.packing import check_some, placed, told, turned
-from langflash_core.export.stored import ROWS_AT_ONCE, Gathering, Rows, parts, to_scene
+from langflash_core.export.settings import STORED
+from langflash_core.export.stored import Gathering, Rows, parts, to_scene
 from langflash_core.geometry.harmonics import MAX_SHOWN_DEGREE
 from langflash_core.geometry.turning import axes_matrix
 from langflash_core.types import Scene
@@ -139,8 +140,8 @@ def _gathered(prims: list[_Prim], name: str) -> Gathering:
     num_bases = max(rows.sh.shape[1] for rows, *_ in prims)
     gathering = Gathering(sum(len(rows.means) for rows, *_ in prims), num_bases, name)
     for rows, place, axes, encoding in prims:
-        for first in range(0, len(rows.means), ROWS_AT_ONCE):
-            some = Rows(*(values[first : first + ROWS_AT_ONCE] for values in rows.all()))
+        for first in range(0, len(rows.means), STORED.rows_at_once):
+            some = Rows(*(values[first : first + STORED.rows_at_once] for values in rows.all()))
             some = with_srgb_colours(some) if encoding.linear else some
             gathering.add(_padded(placed(some, place, axes), num_bases))
     return gathering

@@ -20,10 +20,8 @@ from langflash_core.base.formats import is_film
 from langflash_core.base.limits import PIXELS, PROFILE
 from langflash_core.base.picture_files import TooManyPixels, opened_picture, picture_block
 from langflash_core.errors import ImageError
+from langflash_core.images.settings import DECODING
 
-MIN_SIDE = 32
-MID_GREY = (128, 128, 128, 255)
-DECODED_SIDE = 1536  # pixels on the long side that a reduced JPEG decode keeps at least
 _REMEDY = "use a photo in JPEG, PNG, WebP, HEIC or TIFF format"
 _DAMAGE = (
     OSError, SyntaxError, ValueError, TypeError, LookupError, ArithmeticError, EOFError, AttributeError,
@@ -33,7 +31,6 @@ _ORIENTATION_TAG = 0x0112
 _INTEROP_TAG, _INTEROP_INDEX, _ADOBE_RGB = 0xA005, 1, "R03"  # DCF 2.0: the cameras' way to say Adobe RGB
 _FROM_ADOBE = np.array([[1.398283, -0.398283, 0], [0, 1, 0], [0, -0.042938, 1.042938]], np.float32)
 _ADOBE_GAMMA = 563 / 256
-_ROWS_AT_ONCE = 256  # of a picture whose colours are changed in floats
 _UPRIGHT = {
     2: Image.Transpose.FLIP_LEFT_RIGHT,
     3: Image.Transpose.ROTATE_180,
@@ -127,7 +124,7 @@ def _read_bytes(path: Path, name: str) -> bytes:
 
 def _decode(content: bytes, name: str) -> Photo:
     with opened_picture(content) as opened:
-        if min(opened.size) < MIN_SIDE:
+        if min(opened.size) < DECODING.min_side:
             size = f"{opened.width} x {opened.height}"
             raise ImageError(f"{name} is only {size} pixels; use a photo of at least 200 pixels a side")
         stored = opened.size
@@ -150,7 +147,7 @@ def _decode(content: bytes, name: str) -> Photo:
 
 def _draft_size(size: tuple[int, int]) -> tuple[int, int]:
     """The smallest size that a JPEG decoder may reduce to; other formats ignore it."""
-    ratio = min(1.0, DECODED_SIDE / max(size))
+    ratio = min(1.0, DECODING.decoded_side / max(size))
     return max(1, round(size[0] * ratio)), max(1, round(size[1] * ratio))
 
 
@@ -180,8 +177,8 @@ def _from_adobe_rgb(image: Image.Image) -> Image.Image:
     """sRGB pixels of Adobe RGB ones; what sRGB does not hold is clipped. Source: Adobe RGB (1998), 4.3."""
     light = (np.arange(256) / 255) ** np.float32(_ADOBE_GAMMA)
     pixels = np.array(image)
-    for first in range(0, len(pixels), _ROWS_AT_ONCE):
-        some = slice(first, first + _ROWS_AT_ONCE)
+    for first in range(0, len(pixels), DECODING.rows_at_once):
+        some = slice(first, first + DECODING.rows_at_once)
         linear = (light.astype(np.float32)[pixels[some]] @ _FROM_ADOBE.T).clip(0, 1)
         shown = np.where(linear <= 0.0031308, 12.92 * linear, 1.055 * linear ** (1 / 2.4) - 0.055)
         pixels[some] = np.round(255 * shown)
@@ -194,7 +191,7 @@ def _to_8bit(image: Image.Image) -> Image.Image:
         return Image.fromarray(_scaled_to_8bit(np.asarray(image), image.mode)).convert("RGB")
     if image.mode in ("LA", "La", "PA", "RGBA", "RGBa") or "transparency" in image.info:
         layer = image.convert("RGBA")
-        return Image.alpha_composite(Image.new("RGBA", layer.size, MID_GREY), layer).convert("RGB")
+        return Image.alpha_composite(Image.new("RGBA", layer.size, DECODING.mid_grey), layer).convert("RGB")
     return image.copy() if image.mode in ("RGB", "CMYK") else image.convert("RGB")
 
 

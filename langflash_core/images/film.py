@@ -16,9 +16,8 @@ from jaxtyping import UInt8
 from langflash_core.base.apart import Ended, Part, Refused, ask
 from langflash_core.base.limits import PIXELS
 from langflash_core.errors import FilmError
+from langflash_core.images.settings import LOOKING
 
-LOOKS = 15.0  # pictures a second that are looked at, at most
-MIN_SIDE = 64  # pixels
 _REMEDY = "convert it to H.264 in an .mp4 first, for example with HandBrake"
 
 Picture = UInt8[np.ndarray, "H W 3"]  # blue, green, red, as OpenCV has them
@@ -36,8 +35,8 @@ class Film:
 
 
 class Reader:
-    """An open film; see `opened`. doubtful: pictures given so far that came equal to the last bit, as none of
-    a camera are, from the only decoder that there is: it may not know the film's kind."""
+    """An open film; see `opened`. doubtful: pictures given so far that came equal to the last bit, as none
+    of a camera are, from the only decoder that there is: it may not know the film's kind."""
 
     def __init__(self, path: Path, film: Film) -> None:
         self._path, self.film, self.doubtful = path, film, 0
@@ -45,7 +44,7 @@ class Reader:
     def pictures(
         self, start: float, end: float | None, check: Callable[[], None]
     ) -> Generator[tuple[float, Picture], None, None]:
-        """Seconds from the film's begin, and what is seen then; at most `LOOKS` a second.
+        """Seconds from the film's begin, and what is seen then; at most `LOOKING.looks` a second.
 
         Args:
             end: the last picture's latest time; None: all of the rest.
@@ -54,7 +53,7 @@ class Reader:
         Raises:
             FilmError: its decoder broke, took too long, or wanted too much memory; a picture is too large.
         """
-        bounds = {"start": start, "end": end, "looks": LOOKS, "pixels": PIXELS.value}
+        bounds = {"start": start, "end": end, "looks": LOOKING.looks, "pixels": PIXELS.value}
         with closing(_asked("film pictures", self._path, bounds)) as parts:
             for part in parts:
                 check()
@@ -79,7 +78,7 @@ def opened(path: Path) -> Iterator[Reader]:
         raise FilmError(f"{name} is an empty file; copy it again, or {_REMEDY}")
     (part,) = _asked("film", path, {})
     width, height = int(part.facts["width"]), int(part.facts["height"])
-    if min(width, height) < MIN_SIDE:
+    if min(width, height) < LOOKING.min_side:
         raise FilmError(f"{name} is only {width} x {height} pixels; film at least 480 pixels a side")
     if PIXELS.passed_by(width * height):
         raise FilmError(f"{name} has pictures of {width:,} x {height:,} pixels; {PIXELS.remedy()}")

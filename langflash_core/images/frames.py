@@ -23,7 +23,6 @@ from langflash_core.base.running import Progress
 from langflash_core.errors import FilmError, OutputError
 from langflash_core.images.film import Reader, opened
 from langflash_core.images.motion import (
-    ALIKE,
     Follower,
     Look,
     Marks,
@@ -35,16 +34,13 @@ from langflash_core.images.motion import (
     tiny,
     trackable,
 )
-from langflash_core.images.pictures import MAX_PHOTOS
+from langflash_core.images.settings import CHOOSING, MOTION, PHOTO_LIMITS, STILLS
 from langflash_core.images.still_names import still_name
 from langflash_core.images.strip import (
-    BLURRED,
     ELSEWHERE,
     FORMAT,
     INDEX,
     REPEAT,
-    SMEARED,
-    SPACING,
     Still,
     Strip,
     choose,
@@ -52,18 +48,9 @@ from langflash_core.images.strip import (
     written,
 )
 
-PIECE = 0.02  # of the side that the picture moves in a piece, of which one frame is kept
-RULER = 0.08  # of the side: who turns back where he goes on has gone so far, whose hand shakes has not
-FAST = 0.12  # of the side from one picture to the next: a hand does that, and may then be lost
-MOST_STILLS = 600  # more, and every second one goes
-STILL_SIDE, QUALITY = 1920, 92  # pixels of the longer side of a kept frame, at most
-DARK = 0.08  # a frame whose brightest tenth stays below
-KEPT_FILMS = 8  # of which stills are kept
 STAGE = "film"
 _EQUAL = "comes as equal pictures from the decoder, as interlaced films do"
-_UNSEEN = 0.3  # of the side that the film is taken to have moved where it was lost in a fast turn
 _NO_GREY = np.zeros((1, 1), np.uint8)  # where no length is asked for
-_MOST_SHOTS, _COMPARED = 12, 3  # shots that are compared with each other, stills of each
 
 
 def nothing() -> None:
@@ -93,7 +80,17 @@ def strip_of(
     name = path.name
     with opened(path):  # a film that cannot be read has no place in the cache
         stamp = path.stat()
-    order = [FORMAT, name, stamp.st_size, stamp.st_mtime_ns, start, end, every, PIECE, STILL_SIDE]
+    order = [
+        FORMAT,
+        name,
+        stamp.st_size,
+        stamp.st_mtime_ns,
+        start,
+        end,
+        every,
+        STILLS.piece,
+        STILLS.still_side,
+    ]
     films = home_folder() / "films"
     folder = films / hashlib.sha256(json.dumps(order).encode()).hexdigest()[:16]
     kept = read_strip(folder)
@@ -110,7 +107,7 @@ def strip_of(
 
 
 def frames(
-    film: Path | str, *, most: int = MAX_PHOTOS, start: float = 0.0, end: float | None = None
+    film: Path | str, *, most: int = PHOTO_LIMITS.max_photos, start: float = 0.0, end: float | None = None
 ) -> list[Path]:
     """The sharpest frames of a film as photo files, for `reconstruct`; they stay in the cache for a while.
 
@@ -130,7 +127,7 @@ def _sweep(films: Path, newest: Path) -> None:
         others = [
             each for each in films.iterdir() if each.is_dir() and each != newest and each.name[0] != "."
         ]
-        for each in sorted(others, key=lambda folder: folder.stat().st_mtime)[: -KEPT_FILMS + 1]:
+        for each in sorted(others, key=lambda folder: folder.stat().st_mtime)[: -STILLS.kept_films + 1]:
             shutil.rmtree(each, ignore_errors=True)
 
 
@@ -170,7 +167,7 @@ class _Watch:
         self._base = 0.0  # how far the film had moved at the anchor
         self._carried = 0.0  # how far the piece had moved at the anchor
         self._pace = self._at = 0.0  # of the last two pictures, and where the last one is
-        self._length = PIECE
+        self._length = STILLS.piece
         self._shot = -1
         self._following = False
         self._lost = self._dark = self._plain = self._looked = 0
@@ -214,7 +211,7 @@ class _Watch:
     def _see(self, seconds: float, picture: np.ndarray) -> None:
         look = look_at(picture)
         self._looked += 1
-        if look.light < DARK:
+        if look.light < STILLS.dark:
             self._dark += 1
             return
         moved = self._follower.follow(look.grey) if self._following else None
@@ -225,7 +222,7 @@ class _Watch:
             self._close()
             step = self._wide_step(look)
             self._lost += self._following and step is None
-            self._base += SPACING if step is None else step
+            self._base += CHOOSING.spacing if step is None else step
             self._pace, self._at = self._pace if step is None else step, self._base
             self._shot += step is None
             self._following = self._follower.anchor(look.grey)
@@ -241,7 +238,7 @@ class _Watch:
         else:
             self._judge(look, picture, seconds, place)
         weak = self._follower.weak
-        if weak or moved.since_anchor >= RULER:
+        if weak or moved.since_anchor >= STILLS.ruler:
             anchored = self._follower.anchor(look.grey)
             if anchored or weak:
                 self._base, self._carried = place, self._carried + moved.since_mark
@@ -255,8 +252,8 @@ class _Watch:
             return None
         step = step_between(marks_of(last), marks_of(look.grey), last)
         if step is None:
-            return _UNSEEN if self._pace > FAST else None
-        return max(step, PIECE)
+            return STILLS.unseen if self._pace > STILLS.fast else None
+        return max(step, STILLS.piece)
 
     def _is_over(self, gone: float, seconds: float) -> bool:
         """Whether the piece ends before the picture at hand."""
@@ -294,7 +291,7 @@ class _Watch:
         self._rises.append(piece.sharpest.rise)
         self._greys.append(piece.sharpest.grey)
         self._shots.append(piece.shot)
-        if len(self._stills) > MOST_STILLS:
+        if len(self._stills) > STILLS.most_stills:
             self._thin()
 
     def _thin(self) -> None:
@@ -325,7 +322,8 @@ class _Watch:
         usual = float(np.percentile(rises, 25)) if rises else 1.0
         for index, (still, judged) in enumerate(zip(self._stills, self._judged, strict=True)):
             blurred = sum(
-                sharpness < BLURRED * still.sharpness or rise > SMEARED * usual for sharpness, rise in judged
+                sharpness < CHOOSING.blurred * still.sharpness or rise > CHOOSING.smeared * usual
+                for sharpness, rise in judged
             )
             smear = round(self._rises[index] / usual, 3)
             self._stills[index] = replace(still, blurred=int(blurred), smear=smear)
@@ -363,9 +361,9 @@ class _Watch:
         for later in range(1, len(self._stills)):
             check()
             here = self._stills[later]
-            for earlier in np.flatnonzero(alike[later, :later] > ALIKE):
+            for earlier in np.flatnonzero(alike[later, :later] > MOTION.alike):
                 there = self._stills[earlier]
-                if there.why_not or here.place - there.place < SPACING:
+                if there.why_not or here.place - there.place < CHOOSING.spacing:
                     continue
                 if from_one_place(self._greys[earlier], self._greys[later]):
                     worse = later if here.sharpness <= 1.5 * there.sharpness else int(earlier)
@@ -381,7 +379,7 @@ class _Watch:
         if len(members) == 1:
             return 1
         size = {shot: self._looks(of) for shot, of in members.items()}
-        largest = sorted(size, key=lambda shot: (-size[shot], shot))[:_MOST_SHOTS]
+        largest = sorted(size, key=lambda shot: (-size[shot], shot))[: STILLS.most_shots]
         group = {shot: shot for shot in members}
         marks = {index: marks_of(self._greys[index]) for shot in largest for index in _some(members[shot])}
         for place, one in enumerate(largest):
@@ -446,7 +444,7 @@ def _share_a_room(marks: dict[int, Marks], one: list[int], other: list[int]) -> 
 
 def _some(indices: list[int]) -> list[int]:
     """Some of them, ends included."""
-    places = np.unique(np.round(np.linspace(0, len(indices) - 1, _COMPARED)).astype(int))
+    places = np.unique(np.round(np.linspace(0, len(indices) - 1, STILLS.compared_stills)).astype(int))
     return [indices[place] for place in places]
 
 
@@ -459,11 +457,11 @@ def write_picture(path: Path, picture: np.ndarray) -> None:
     import cv2
 
     height, width = picture.shape[:2]
-    ratio = STILL_SIDE / max(height, width)
+    ratio = STILLS.still_side / max(height, width)
     if ratio < 1:
         size = max(1, round(width * ratio)), max(1, round(height * ratio))
         picture = cv2.resize(picture, size, interpolation=cv2.INTER_AREA)
-    done, content = cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, QUALITY])
+    done, content = cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, STILLS.quality])
     if not done:
         raise OutputError(f"cannot write {path}: the frame could not be encoded; choose another film")
     try:

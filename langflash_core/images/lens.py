@@ -12,16 +12,11 @@ from torch import Tensor
 from langflash_core.errors import InputError
 from langflash_core.geometry.cameras import intrinsics_from_fov
 from langflash_core.images.decode import PhotoFacts
+from langflash_core.images.settings import LENS_PRIOR
 from langflash_core.types import Lenses
 
 Intrinsics = tuple[float, float, float, float]
 """fx, fy, cx, cy."""
-ASSUMED_FOV = 65.0  # degrees on the longer side: a phone's main camera (24-28 mm equivalent)
-PLAUSIBLE_FOV = (5.0, 150.0)  # degrees; EXIF that says otherwise is wrong
-FILM_DIAGONAL = math.hypot(36.0, 24.0)  # mm
-_ASSUMED_DOUBT, _RECORDED_DOUBT = 0.35, 0.02
-"""Standard deviations of the logarithm of a focal length: of an assumed one (a wide lens is at -.6, twice the
-zoom at +.7), of a recorded one, which is rounded to a millimetre of some 26 and changes with the focus."""
 _FOCAL_35MM, _FOCAL, _PLANE_X, _PLANE_UNIT = 0xA405, 0x920A, 0xA20E, 0xA210
 _PIXEL_X, _PIXEL_Y = 0xA002, 0xA003
 _UNIT_MM = {2: 25.4, 3: 10.0, 4: 1.0, 5: 0.001}
@@ -72,7 +67,7 @@ def photo_intrinsics(
         return intrinsics_from_fov(fov, photo.width, photo.height), False
     focal = exif_focal(photo)
     if focal is None:
-        return intrinsics_from_fov(ASSUMED_FOV, photo.width, photo.height), True
+        return intrinsics_from_fov(LENS_PRIOR.assumed_fov, photo.width, photo.height), True
     centre_x, centre_y = photo.width / 2, photo.height / 2
     return torch.tensor([[focal, 0.0, centre_x], [0.0, focal, centre_y], [0.0, 0.0, 1.0]]), False
 
@@ -100,9 +95,15 @@ def known_lenses(
         key = (longer, min(photo.width, photo.height), fov, focal and round(focal, 2))
         if key not in keys:
             keys[key] = len(keys)
-            own = fov or ASSUMED_FOV
+            own = fov or LENS_PRIOR.assumed_fov
             fields.append(own if focal is None else 2 * math.degrees(math.atan(longer / (2 * focal))))
-            doubts.append(0.0 if fov is not None else _ASSUMED_DOUBT if focal is None else _RECORDED_DOUBT)
+            doubts.append(
+                0.0
+                if fov is not None
+                else LENS_PRIOR.assumed_doubt
+                if focal is None
+                else LENS_PRIOR.recorded_doubt
+            )
             recorded.append(focal is not None)
         of.append(keys[key])
     return Lenses(tuple(of), tuple(fields), tuple(doubts), tuple(recorded), note)
@@ -125,12 +126,12 @@ def exif_focal(photo: PhotoFacts) -> float | None:
     if focal is None:
         return None
     fov = 2 * math.degrees(math.atan(max(photo.width, photo.height) / (2 * focal)))
-    return focal if PLAUSIBLE_FOV[0] <= fov <= PLAUSIBLE_FOV[1] else None
+    return focal if LENS_PRIOR.plausible_fov[0] <= fov <= LENS_PRIOR.plausible_fov[1] else None
 
 
 def _focal_from_35mm(photo: PhotoFacts) -> float | None:
     equivalent = _number(photo.exif.get(_FOCAL_35MM))
-    return equivalent and equivalent / FILM_DIAGONAL * math.hypot(photo.width, photo.height)
+    return equivalent and equivalent / LENS_PRIOR.film_diagonal * math.hypot(photo.width, photo.height)
 
 
 def _focal_from_plane(photo: PhotoFacts) -> float | None:

@@ -14,19 +14,7 @@ import cv2
 import numpy as np
 from jaxtyping import Float32, UInt8
 
-SIDE = 320  # pixels of the longer side in which corners are followed
-SHARP_SIDE = 768  # in which sharpness is judged: that of the finest elements of a scene
-CORNERS, FEWEST = 300, 20
-BACK = 1.0  # pixels by which a corner may miss its place on the way back
-LOST = 0.15  # of the corners followed: below, this is another shot
-WEAK = 0.45  # of those at the anchor: below, fresh ones are taken
-SAME, ALIKE = 0.02, 0.85  # moved, most of what is seen, and correlation of two pictures from one place
-_FAR, _MOST, _STAY = 80, 85, 40  # per cent of the corners
-_MOVES = 1.0  # pixels: less is where corners are found, not where they are
-EDGE, EDGES, REACH = 30, 40, 15  # steps of grey of an edge that tells of blur, how many, pixels across it
-JOINS, AGREE = 16, 0.5  # matches that agree with one motion, and their share: two pictures show one room
-_TINY = (32, 24)
-_WINDOW, _LEVELS = (21, 21), 3
+from langflash_core.images.settings import MOTION
 
 Grey = UInt8[np.ndarray, "H W"]
 Points = Float32[np.ndarray, "P 2"]
@@ -45,10 +33,10 @@ class Look:
 
 def look_at(picture: UInt8[np.ndarray, "H W 3"]) -> Look:
     """Judge a picture."""
-    grey = cv2.cvtColor(_shrunk(picture, SHARP_SIDE), cv2.COLOR_BGR2GRAY)
+    grey = cv2.cvtColor(_shrunk(picture, MOTION.sharp_side), cv2.COLOR_BGR2GRAY)
     smooth = _smoothed(grey)
     sharpness = float(cv2.Laplacian(smooth, cv2.CV_32F).var())
-    return Look(_shrunk(grey, SIDE), sharpness, _farther(smooth), float(np.percentile(grey, 90)) / 255)
+    return Look(_shrunk(grey, MOTION.side), sharpness, _farther(smooth), float(np.percentile(grey, 90)) / 255)
 
 
 def _smoothed(grey: Grey) -> Grey:
@@ -64,10 +52,10 @@ def _farther(smooth: Grey) -> float:
 def _rise(grey: Grey) -> float:
     """Contrast / steepest slope along x of edges, the sharpest fifth; whatever their contrast."""
     values = grey.astype(np.float32)
-    slope, across = np.abs(np.diff(values, axis=1)), np.ones((1, REACH), np.uint8)
+    slope, across = np.abs(np.diff(values, axis=1)), np.ones((1, MOTION.reach), np.uint8)
     contrast = (cv2.dilate(values, across) - cv2.erode(values, across))[:, 1:]
-    edges = (contrast > EDGE) & (slope >= 0.99 * cv2.dilate(slope, across))
-    if edges.sum() < EDGES:
+    edges = (contrast > MOTION.edge) & (slope >= 0.99 * cv2.dilate(slope, across))
+    if edges.sum() < MOTION.edges:
         return 0.0
     return float(np.percentile(contrast[edges] / slope[edges], 20))
 
@@ -91,7 +79,7 @@ class Follower:
     def anchor(self, grey: Grey) -> bool:
         """Begin here; whether there is enough to follow."""
         points = _corners(grey)
-        if len(points) < FEWEST:
+        if len(points) < MOTION.fewest:
             return False
         self.last, self._count = grey, len(points)
         self._anchored = self._marked = self._now = points
@@ -107,11 +95,12 @@ class Follower:
             return None
         there, found = _tracked(self.last, grey, self._now)
         share = float(found.mean()) if len(found) else 0.0
-        if share < WEAK:  # a step too wide for corners: the whole picture tells about where to seek them
+        # a step too wide for corners: the whole picture tells about where to seek them
+        if share < MOTION.weak:
             on, again = _tracked(self.last, grey, self._now, _shift(self.last, grey))
             if again.sum() > found.sum():
                 there, found, share = on, again, float(again.mean())
-        if share < LOST or found.sum() < FEWEST // 2:
+        if share < MOTION.lost or found.sum() < MOTION.fewest // 2:
             return None
         self._anchored, self._marked = self._anchored[found], self._marked[found]
         self._now, self.last = there[found], grey
@@ -120,17 +109,17 @@ class Follower:
     @property
     def weak(self) -> bool:
         """Whether few of the anchor's corners are left."""
-        return len(self._now) < WEAK * self._count
+        return len(self._now) < MOTION.weak * self._count
 
 
 def trackable(grey: Grey) -> bool:
     """Whether a picture shows enough to be followed."""
-    return len(_corners(grey)) >= FEWEST
+    return len(_corners(grey)) >= MOTION.fewest
 
 
 def tiny(grey: Grey) -> Float32[np.ndarray, " T"]:
     """A picture as a vector of unit length, for comparing many."""
-    small = cv2.resize(grey, _TINY, interpolation=cv2.INTER_AREA).astype(np.float32).ravel()
+    small = cv2.resize(grey, MOTION.tiny, interpolation=cv2.INTER_AREA).astype(np.float32).ravel()
     small -= small.mean()
     return small / max(float(np.linalg.norm(small)), 1e-6)
 
@@ -140,10 +129,10 @@ def from_one_place(one: Grey, other: Grey) -> bool:
     if one.shape != other.shape:
         return False
     points = _corners(one)
-    if len(points) < FEWEST:
+    if len(points) < MOTION.fewest:
         return False
     there, found = _tracked(one, other, points)
-    return bool(found.mean() > 0.5) and _gone(points[found], there[found], one, _MOST) < SAME
+    return bool(found.mean() > 0.5) and _gone(points[found], there[found], one, MOTION.most) < MOTION.same
 
 
 @dataclass(frozen=True)
@@ -165,16 +154,16 @@ def marks_of(grey: Grey) -> Marks:
 def step_between(one: Marks, other: Marks, grey: Grey) -> float | None:
     """How far what two pictures have in common has moved between them, from wherever they show it; None where
     there is nothing. grey: one of them."""
-    if min(len(one.places), len(other.places)) < JOINS:
+    if min(len(one.places), len(other.places)) < MOTION.joins:
         return None
     pairs = cv2.BFMatcher().knnMatch(one.seen, other.seen, k=2)
     good = [pair[0] for pair in pairs if len(pair) == 2 and pair[0].distance < 0.75 * pair[1].distance]
-    if len(good) < JOINS:
+    if len(good) < MOTION.joins:
         return None
     here = one.places[[match.queryIdx for match in good]]
     there = other.places[[match.trainIdx for match in good]]
     _, agree = cv2.findFundamentalMat(here, there, cv2.FM_RANSAC, 1.5, 0.999)
-    if agree is None or agree.sum() < max(JOINS, AGREE * len(good)):
+    if agree is None or agree.sum() < max(MOTION.joins, MOTION.agree * len(good)):
         return None
     kept = agree.ravel() == 1
     return _gone(here[kept], there[kept], grey)
@@ -194,7 +183,7 @@ def _corners(grey: np.ndarray) -> np.ndarray:
     """(P, 2) float32. Those that stand out less than a fiftieth of the contrast are noise."""
     if float(grey.std()) < 2.0:
         return np.empty((0, 2), np.float32)
-    found = cv2.goodFeaturesToTrack(grey, CORNERS, 0.01, 6)
+    found = cv2.goodFeaturesToTrack(grey, MOTION.corners, 0.01, 6)
     return np.empty((0, 2), np.float32) if found is None else found.reshape(-1, 2).astype(np.float32)
 
 
@@ -221,16 +210,22 @@ def _tracked(
     height, width = one.shape
     inside = (there >= 0).all(1) & (there[:, 0] < width) & (there[:, 1] < height)
     found = (on.ravel() == 1) & (off.ravel() == 1) & inside
-    return there, found & (np.abs(back - points).max(1) < BACK)
+    return there, found & (np.abs(back - points).max(1) < MOTION.back)
 
 
 def _flow(one: np.ndarray, other: np.ndarray, points: np.ndarray, guess: np.ndarray):
     return cv2.calcOpticalFlowPyrLK(
-        one, other, points, guess, winSize=_WINDOW, maxLevel=_LEVELS, flags=cv2.OPTFLOW_USE_INITIAL_FLOW
+        one,
+        other,
+        points,
+        guess,
+        winSize=MOTION.window,
+        maxLevel=MOTION.levels,
+        flags=cv2.OPTFLOW_USE_INITIAL_FLOW,
     )
 
 
-def _gone(before: np.ndarray, now: np.ndarray, grey: np.ndarray, percent: float = _FAR) -> float:
+def _gone(before: np.ndarray, now: np.ndarray, grey: np.ndarray, percent: float = MOTION.far) -> float:
     """Way that so many per cent of the corners do not exceed, share of the side."""
-    stay, far = np.percentile(np.linalg.norm(now - before, axis=1), (_STAY, percent))
-    return float(stay if stay < _MOVES else far) / math.sqrt(grey.size)
+    stay, far = np.percentile(np.linalg.norm(now - before, axis=1), (MOTION.stay, percent))
+    return float(stay if stay < MOTION.moves else far) / math.sqrt(grey.size)

@@ -17,16 +17,9 @@ from PIL import Image
 
 from langflash_core.errors import InputError
 from langflash_core.images.decode import Photo, PhotoFacts, read_photo
+from langflash_core.images.settings import PHOTO_LIMITS
 from langflash_core.images.still_names import shown_name
 
-MAX_PHOTOS = 300
-FILM_PHOTOS = 32
-"""Frames of a film that a scene is made of unless more are asked for: each takes as long as a photo."""
-MAX_ASPECT = 2.0
-SOURCE_SIDE = 768
-SOURCE_QUALITY = 88
-JUDGED_SIDE = 360  # pixels of the short side at which light and sharpness are judged
-_READERS = 4  # photos in memory at once, as they were decoded
 Box = tuple[float, float, float, float]
 
 
@@ -59,7 +52,7 @@ def read_pictures(
     """Photos in the first one's shape, the others centre-cropped to it.
 
     Args:
-        photos: 1 to `MAX_PHOTOS` files.
+        photos: 1 to `PHOTO_LIMITS.max_photos` files.
         area: about this many pixels each. multiple: of which both sides are multiples.
         square: the centre square of every photo instead of the first one's shape.
         check: called before each photo; what it raises ends the work.
@@ -80,7 +73,7 @@ def read_pictures(
         check()
         return _picture(read_photo(paths[place], names[place]) if place else first, size)
 
-    with ThreadPoolExecutor(_READERS, thread_name_prefix="langflash-photos") as pool:
+    with ThreadPoolExecutor(PHOTO_LIMITS.readers, thread_name_prefix="langflash-photos") as pool:
         try:
             return list(pool.map(rest, range(len(paths))))
         finally:
@@ -97,13 +90,15 @@ def photo_paths(photos: Sequence[Path | str]) -> list[Path]:
     """The files of an argument, one or several.
 
     Raises:
-        InputError: none, or more than `MAX_PHOTOS`.
+        InputError: none, or more than `PHOTO_LIMITS.max_photos`.
     """
     listed = [photos] if isinstance(photos, str | Path) else list(photos)
     if not listed:
         raise InputError("no photo was given; name one or more photos of a room")
-    if len(listed) > MAX_PHOTOS:
-        raise InputError(f"{len(listed)} photos are too many; choose at most {MAX_PHOTOS} that overlap well")
+    if len(listed) > PHOTO_LIMITS.max_photos:
+        raise InputError(
+            f"{len(listed)} photos are too many; choose at most {PHOTO_LIMITS.max_photos} that overlap well"
+        )
     return [Path(photo) for photo in listed]
 
 
@@ -124,7 +119,7 @@ def fitting_size(width: int, height: int, area: int, multiple: int) -> tuple[int
     The aspect ratio is held within 2:1. A wrong shape cuts content off and a wrong area only
     costs or saves time, so the shape counts double.
     """
-    aspect = min(max(width / height, 1 / MAX_ASPECT), MAX_ASPECT)
+    aspect = min(max(width / height, 1 / PHOTO_LIMITS.max_aspect), PHOTO_LIMITS.max_aspect)
     ideal = math.sqrt(area * aspect) / multiple, math.sqrt(area / aspect) / multiple
     choices = [
         (columns, rows)
@@ -158,7 +153,7 @@ def _scaled(photo: Photo, box: Box, size: tuple[int, int]) -> Image.Image:
 
 def judged_grey(image: Image.Image) -> np.ndarray:
     """The whole photo, (h, w) uint8, at the size where light and sharpness are judged."""
-    ratio = min(1.0, JUDGED_SIDE / min(image.size))
+    ratio = min(1.0, PHOTO_LIMITS.judged_side / min(image.size))
     size = max(3, round(image.width * ratio)), max(3, round(image.height * ratio))
     return np.asarray(image.convert("L").resize(size, Image.Resampling.LANCZOS, reducing_gap=3.0))
 
@@ -167,8 +162,10 @@ def _source_jpeg(photo: Photo, box: Box, size: tuple[int, int]) -> bytes:
     """The crop as JPEG bytes of exactly the view's shape, up to 768 pixels long, never enlarged."""
     divisor = math.gcd(*size)
     columns, rows = size[0] // divisor, size[1] // divisor
-    long_side = min(SOURCE_SIDE, max(box[2] - box[0], box[3] - box[1]) + 1e-6)
+    long_side = min(PHOTO_LIMITS.source_side, max(box[2] - box[0], box[3] - box[1]) + 1e-6)
     steps = max(1, int(long_side / max(columns, rows)))
     stream = io.BytesIO()
-    _scaled(photo, box, (columns * steps, rows * steps)).save(stream, "JPEG", quality=SOURCE_QUALITY)
+    _scaled(photo, box, (columns * steps, rows * steps)).save(
+        stream, "JPEG", quality=PHOTO_LIMITS.source_quality
+    )
     return stream.getvalue()

@@ -14,12 +14,8 @@ import torch
 from torch import Tensor
 
 from langflash_core.base.records import FoundFocal
+from langflash_core.images.settings import STRAIGHTEN
 from langflash_core.types import Views
-
-_QUALITY = 95  # of JPEG: what was stored once already loses no more than it must
-_SCALES = (0.25, 4.0)  # s that is looked for
-_STEPS = 30  # of halving: to a thousandth of a pixel
-_STEEPEST = 0.1  # of a straight lens: what is magnified along the radius, at least
 
 
 def after(before: FoundFocal | None, found: FoundFocal) -> FoundFocal:
@@ -67,11 +63,11 @@ def smallest_scale(size: tuple[int, int], centre: np.ndarray, bend: float) -> fl
     sides = [np.column_stack((x, np.full(65, edge))) for edge in (0.0, height)]
     sides += [np.column_stack((np.full(65, edge), y)) for edge in (0.0, width)]
     border = np.concatenate(sides) - centre
-    low, high = _SCALES
-    for _ in range(_STEPS):
+    low, high = STRAIGHTEN.scales
+    for _ in range(STRAIGHTEN.steps):
         middle = (low + high) / 2
         places = bent(border / middle, bend) + centre
-        steep = 1 + 3 * bend * ((border / middle) ** 2).sum(1).max() > _STEEPEST
+        steep = 1 + 3 * bend * ((border / middle) ** 2).sum(1).max() > STRAIGHTEN.steepest
         inside = steep and (places >= 0).all() and (places <= np.array(size)).all()
         low, high = (low, middle) if inside else (middle, high)
     return high
@@ -88,7 +84,8 @@ def _drawn(pixels: np.ndarray, centre: np.ndarray, bend: float, scale: float) ->
     columns, rows = np.meshgrid(np.arange(width) + 0.5, np.arange(height) + 0.5)
     straight = (np.stack((columns, rows), -1) - centre) / scale
     places = (bent(straight, bend) + centre - 0.5).astype(np.float32)
-    return cv2.remap(pixels, places, None, cv2.INTER_CUBIC, borderMode=cv2.BORDER_REPLICATE)  # pyright: ignore
+    nearest = cv2.BORDER_REPLICATE
+    return cv2.remap(pixels, places, None, cv2.INTER_CUBIC, borderMode=nearest)  # pyright: ignore
 
 
 def _redrawn(image: Tensor, centre: np.ndarray, bend: float, scale: float) -> Tensor:
@@ -105,4 +102,4 @@ def _redrawn_source(
     assert pixels is not None, "sources are JPEG bytes that images/ wrote"
     times = pixels.shape[1] / size[0]
     drawn = _drawn(pixels, centre * times, bend / times**2, scale)
-    return cv2.imencode(".jpg", drawn, [cv2.IMWRITE_JPEG_QUALITY, _QUALITY])[1].tobytes()
+    return cv2.imencode(".jpg", drawn, [cv2.IMWRITE_JPEG_QUALITY, STRAIGHTEN.quality])[1].tobytes()

@@ -15,17 +15,10 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from langflash_core.errors import FilmError
-from langflash_core.images.pictures import FILM_PHOTOS
+from langflash_core.images.settings import CHOOSING, PHOTO_LIMITS
 
 FORMAT = 3
 INDEX = "strip.json"
-SPACING = 0.05  # of the side, the root of a picture's area, from one chosen frame to the next
-NARROWEST, WIDEST = 0.4, 0.35  # of the spacing; of the side: nearly half of a picture may then be new
-NEAR = 0.25  # of the side: frames that are compared for sharpness
-BLURRED, SMEARED = 0.4, 1.5  # sharpness below that of the sharpest near; edges that rise over more than usual
-APART = 0.35  # of the side: frames that are farther from each other have too little in common
-STANDS = 0.02  # of the side: a film that moves less is a still
-_UNEVEN = 1.5  # what a gap twice as wide as the others costs, in factors of e of sharpness
 REPEAT, ELSEWHERE = "repeat", "elsewhere"
 REASONS = {
     "between": "lay between them",
@@ -112,7 +105,7 @@ def choose(strip: Strip, most: int, fewest: int = 2) -> Choice:
     taken = _without_blurred(places, relative, smears, usable)
     blurred = usable & ~taken
     way = float(np.ptp(places[usable])) if usable.any() else 0.0
-    if usable.sum() < 2 or way < STANDS:
+    if usable.sum() < 2 or way < CHOOSING.stands:
         raise FilmError(
             f"{strip.film} stands still, all its frames show the same; walk around the room while filming"
         )
@@ -120,12 +113,12 @@ def choose(strip: Strip, most: int, fewest: int = 2) -> Choice:
     if strip.every is not None:
         chosen = _evenly(np.flatnonzero(taken), most)
     else:
-        reach = APART * (max(most, FILM_PHOTOS) - 1)
+        reach = CHOOSING.apart * (max(most, PHOTO_LIMITS.film_photos) - 1)
         covered = places <= places[usable][0] + reach
         if not covered.all():
             until = stills[int(np.flatnonzero(covered)[-1])].seconds
             taken, way = taken & covered, reach
-        count = min(max(round(way / SPACING) + 1, fewest), most, int(taken.sum()))
+        count = min(max(round(way / CHOOSING.spacing) + 1, fewest), most, int(taken.sum()))
         indices = np.flatnonzero(taken)
         chosen = indices[_best(places[indices], np.log(relative[indices].clip(0.05)), count)]
     gaps = np.diff(places[chosen])
@@ -138,12 +131,12 @@ def notes_on(strip: Strip, choice: Choice) -> tuple[str, ...]:
     """What people should know of a choice, a sentence each."""
     notes = list(strip.notes)
     if choice.until is not None:
+        most = max(len(choice.chosen), PHOTO_LIMITS.film_photos)
         notes.append(
-            f"{strip.film} shows more than {max(len(choice.chosen), FILM_PHOTOS)} photos can cover, what "
-            f"comes after {choice.until:.1f} s is left out; more frames cover more, and --from and --to tell "
-            "another part"
+            f"{strip.film} shows more than {most} photos can cover, what comes after {choice.until:.1f} s is "
+            "left out; more frames cover more, and --from and --to tell another part"
         )
-    if choice.gap > 3 * APART and strip.every is None:
+    if choice.gap > 3 * CHOOSING.apart and strip.every is None:
         notes.append(
             f"frames of {strip.film} lie far apart, {choice.gap:.0%} of the picture; "
             "take more of them or, with --from and --to, less of the film"
@@ -160,7 +153,7 @@ def _places(stills: Sequence[Still], usable: Bool[np.ndarray, " S"]) -> Float[np
         if before is not None and index > before + 1:
             inside = steps[before + 1 : index + 1]
             inside[:] = 0.0
-            steps[index] = min(float(places[index] - places[before]), SPACING)
+            steps[index] = min(float(places[index] - places[before]), CHOOSING.spacing)
         before = index
     return np.cumsum(steps)
 
@@ -169,7 +162,7 @@ def _relative(
     places: Float[np.ndarray, " S"], sharpness: Float[np.ndarray, " S"], usable: Bool[np.ndarray, " S"]
 ) -> Float[np.ndarray, " S"]:
     """Sharpness as a share of that of the sharpest usable still near by; only neighbours show the same."""
-    near = (np.abs(places[:, None] - places[None]) <= NEAR) & usable[None]
+    near = (np.abs(places[:, None] - places[None]) <= CHOOSING.near) & usable[None]
     best = np.where(near, sharpness[None], 0.0).max(1, initial=0.0)
     return np.minimum(sharpness / np.maximum(best, 1e-6), 1.0)
 
@@ -181,11 +174,11 @@ def _without_blurred(
     usable: Bool[np.ndarray, " S"],
 ) -> Bool[np.ndarray, " S"]:
     """Usable stills, blurred ones only where nothing sharper is seen half a picture around."""
-    taken = usable & (relative >= BLURRED) & (smears <= SMEARED)
+    taken = usable & (relative >= CHOOSING.blurred) & (smears <= CHOOSING.smeared)
     blurred = np.flatnonzero(usable & ~taken)
     for index in blurred[np.argsort(smears[blurred], kind="stable")]:
         kept = places[taken]
-        if not len(kept) or float(np.abs(kept - places[index]).min()) > WIDEST / 2:
+        if not len(kept) or float(np.abs(kept - places[index]).min()) > CHOOSING.widest / 2:
             taken[index] = True
     return taken
 
@@ -196,20 +189,20 @@ def _best(
     """`count` of the stills, in order, for which sum of worth - unevenness is highest."""
     spacing = max(float(np.ptp(places)) / max(count - 1, 1), 1e-9)
     ratio = (places[None] - places[:, None]) / spacing  # (from, to)
-    cost = np.where(ratio > 0, _UNEVEN * (ratio - 1) ** 2, np.inf)
-    cost = np.where((ratio > 0) & (ratio < NARROWEST), cost + 10.0, cost)
+    cost = np.where(ratio > 0, CHOOSING.uneven * (ratio - 1) ** 2, np.inf)
+    cost = np.where((ratio > 0) & (ratio < CHOOSING.narrowest), cost + 10.0, cost)
     index = np.arange(len(places))
     cost[np.tril_indices(len(places))] = np.inf
     cost = np.where(
         (index[None] > index[:, None]) & np.isinf(cost), 1e6, cost
     )  # two at one place, if it must be
-    total = worth - _UNEVEN * ((places - places[0]) / spacing) ** 2
+    total = worth - CHOOSING.uneven * ((places - places[0]) / spacing) ** 2
     came = np.zeros((count, len(places)), dtype=np.int64)
     for step in range(1, count):
         reached = total[:, None] - cost
         came[step] = reached.argmax(0)
         total = reached.max(0) + worth
-    total = total - _UNEVEN * ((places[-1] - places) / spacing) ** 2
+    total = total - CHOOSING.uneven * ((places[-1] - places) / spacing) ** 2
     way = [int(total.argmax())]
     for step in range(count - 1, 0, -1):
         way.append(int(came[step, way[-1]]))
@@ -234,7 +227,7 @@ def _left(
         elif until is not None and still.seconds > until:
             left["beyond"] += still.looks
         else:
-            itself = index in chosen and still.smear > SMEARED
+            itself = index in chosen and still.smear > CHOOSING.smeared
             left["blurred"] += still.looks if blurred[index] else still.blurred - itself
     left |= {"dark": strip.dark, "plain": strip.plain}
     left["between"] = strip.looked - len(chosen) - sum(left.values())

@@ -14,19 +14,7 @@ from torch.nn.functional import max_pool2d
 from langflash_core.errors import ImageError
 from langflash_core.geometry.cameras import fov_degrees
 from langflash_core.images.decode import PhotoFacts
-
-SMALL_SIDE = 200  # pixels of the short side
-DARK_LIGHTS = 0.22  # a photo whose brightest 10 % stay below this is too dark
-BLANK_SPREAD = 4 / 255  # a photo whose pixels differ by less shows nothing; the darkest usable ones have 7
-BURNT_SHARE = 0.5  # share of pixels at the top of the range
-BLUR_WIDTH = 4.0  # pixels at that size over which even the sharpest edges rise
-EDGE_CONTRAST = 0.12  # an edge weaker than this says nothing about sharpness
-EDGE_BLOCKS = 40  # fewer stretches with an edge: a plain wall, not judged
-SAME_DIFFERENCE = 1.5 / 255  # mean absolute difference of two views of the same picture
-ALIKE_ONE_BY_ONE = 3  # photos that show the same as others: so many are named, more are counted
-LOST_SHARE = 0.25  # of a photo's area that the crop may cut off without a note
-FOV_RANGE = (25.0, 110.0)  # degrees of the longer side
-_BLOCK, _WINDOW = 12, 25  # pixels along an edge's rise
+from langflash_core.images.settings import JUDGING
 
 
 def photo_notes(photo: PhotoFacts, image: Tensor, grey: np.ndarray) -> list[str]:
@@ -37,15 +25,15 @@ def photo_notes(photo: PhotoFacts, image: Tensor, grey: np.ndarray) -> list[str]
         grey: (h, w) uint8, the whole photo at the size where light and sharpness are judged.
     """
     notes = []
-    if min(photo.width, photo.height) < SMALL_SIDE:
+    if min(photo.width, photo.height) < JUDGING.small_side:
         notes.append(
             f"{photo.name} is small ({photo.width} x {photo.height} pixels), expect little detail; "
-            f"use a photo of at least {SMALL_SIDE} pixels a side"
+            f"use a photo of at least {JUDGING.small_side} pixels a side"
         )
     luma = torch.from_numpy(grey.astype(np.float32)) / 255
-    if float(torch.quantile(image.mean(0).flatten(), 0.9)) < DARK_LIGHTS:
+    if float(torch.quantile(image.mean(0).flatten(), 0.9)) < JUDGING.dark_lights:
         notes.append(f"{photo.name} is very dark; take it again with more light")
-    elif float((luma > 250 / 255).float().mean()) > BURNT_SHARE:
+    elif float((luma > 250 / 255).float().mean()) > JUDGING.burnt_share:
         notes.append(f"{photo.name} is over-exposed, more than half of it is pure white; expose it less")
     elif is_blurred(luma):
         notes.append(f"{photo.name} is blurred; hold the camera still and take it again")
@@ -58,7 +46,7 @@ def check_shown(names: Sequence[str], images: Sequence[Tensor]) -> None:
     Raises:
         ImageError: all are black, white, or of one colour, as with a lens cap on.
     """
-    if any(_spread(image) >= BLANK_SPREAD for image in images):
+    if any(_spread(image) >= JUDGING.blank_spread for image in images):
         return
     subject = f"{names[0]} shows" if len(names) == 1 else "the photos show"
     raise ImageError(f"{subject} nothing, all pixels are alike; take photos of a place, with light")
@@ -82,7 +70,7 @@ def crop_notes(photo: PhotoFacts, box: tuple[float, float, float, float] | None,
     if box is None:
         return []
     kept = (box[2] - box[0]) * (box[3] - box[1]) / (photo.width * photo.height)
-    if 1 - kept > LOST_SHARE:
+    if 1 - kept > JUDGING.lost_share:
         return [
             f"{photo.name} has another shape than {first}, {1 - kept:.0%} of it was cut off; "
             "take all photos upright or all lengthwise"
@@ -94,9 +82,9 @@ def fov_notes(name: str, K: Tensor, width: int, height: int) -> list[str]:
     """A field of view on the longer side below 25 or above 110 degrees."""
     horizontal, vertical = fov_degrees(K, width, height)
     fov = horizontal if width >= height else vertical
-    if FOV_RANGE[0] <= round(fov, 2) <= FOV_RANGE[1]:
+    if JUDGING.fov_range[0] <= round(fov, 2) <= JUDGING.fov_range[1]:
         return []
-    kind = "narrow" if fov < FOV_RANGE[0] else "wide"
+    kind = "narrow" if fov < JUDGING.fov_range[0] else "wide"
     return [
         f"{name} has a very {kind} field of view ({fov:.0f} degrees), depth will be poor; use a normal lens"
     ]
@@ -107,13 +95,13 @@ def identical_notes(names: Sequence[str], images: Sequence[Tensor]) -> list[str]
     notes = []
     for later in range(1, len(images)):
         for earlier in range(later):
-            if float((images[later] - images[earlier]).abs().mean()) < SAME_DIFFERENCE:
+            if float((images[later] - images[earlier]).abs().mean()) < JUDGING.same_difference:
                 notes.append(
                     f"{names[earlier]} and {names[later]} show the same picture; "
                     "take them from places a step apart"
                 )
                 break
-    if len(notes) <= ALIKE_ONE_BY_ONE:
+    if len(notes) <= JUDGING.alike_one_by_one:
         return notes
     return [
         f"{len(notes)} of {len(images)} photos show the same picture as one before them; "
@@ -131,7 +119,7 @@ def is_blurred(luma: Tensor) -> bool:
     directions apart, because a moving camera smears one and leaves the other sharp.
     """
     return any(
-        len(widths) >= EDGE_BLOCKS and float(torch.quantile(widths, 0.2)) > BLUR_WIDTH
+        len(widths) >= JUDGING.edge_blocks and float(torch.quantile(widths, 0.2)) > JUDGING.blur_width
         for widths in (edge_widths(luma), edge_widths(luma.T))
     )
 
@@ -146,10 +134,12 @@ def edge_widths(luma: Tensor) -> Tensor:
     inner = luma[None, 1:-1, 1:-1]
 
     def highest(values: Tensor) -> Tensor:
-        return max_pool2d(values, (1, _WINDOW), stride=(4, _BLOCK), padding=(0, _WINDOW // 2)).flatten()
+        return max_pool2d(
+            values, (1, JUDGING.window), stride=(4, JUDGING.block), padding=(0, JUDGING.window // 2)
+        ).flatten()
 
     contrast = highest(inner) + highest(-inner)
     steepest = highest(slope_x)
     crossing = highest(torch.where(slope_x >= slope_y, slope_x, 0.0)) >= 0.99 * steepest
-    edges = (contrast > EDGE_CONTRAST) & crossing
+    edges = (contrast > JUDGING.edge_contrast) & crossing
     return contrast[edges] / steepest[edges].clamp_min(1e-6)

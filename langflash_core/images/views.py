@@ -12,8 +12,9 @@ from langflash_core.base.picture_files import STORED, opened_picture
 from langflash_core.errors import InputError
 from langflash_core.images import triage
 from langflash_core.images.decode import PhotoFacts
-from langflash_core.images.lens import ASSUMED_FOV, Intrinsics, check_lens, known_lenses, photo_intrinsics
+from langflash_core.images.lens import Intrinsics, check_lens, known_lenses, photo_intrinsics
 from langflash_core.images.pictures import Box, Picture, photo_names, photo_paths, read_pictures
+from langflash_core.images.settings import LENS_PRIOR
 from langflash_core.types import Views
 
 
@@ -158,4 +159,4 @@ def _decoded(source: bytes) -> Tensor:
 def _assumption(assumed: list[str], total: int) -> str:
     whose = "the photos do not record their lens" if len(assumed) == total > 1 else ""
     whose = whose or f"{' and '.join(assumed)} {'does' if len(assumed) == 1 else 'do'} not record the lens"
-    return f"{whose}, a field of view of {ASSUMED_FOV:g}° is assumed; set it with --fov"
+    return f"{whose}, a field of view of {LENS_PRIOR.assumed_fov:g}° is assumed; set it with --fov"

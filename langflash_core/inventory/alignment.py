@@ -20,18 +20,13 @@ from scipy.spatial.transform import Rotation
 from langflash_core.base.picture_files import STORED, opened_picture
 from langflash_core.errors import InputError
 from langflash_core.geometry.cameras import invert_rigid
+from langflash_core.inventory.settings import ALIGNMENT
 from langflash_core.inventory.things import Inventory
-from langflash_core.language.answers import COVERED_ALPHA
+from langflash_core.language.settings import ANSWERING
 from langflash_core.scene.world import turn_of
 from langflash_core.types import Camera, Frame
 
 Render = Callable[..., Frame]  # (scene, camera, weight_maps=True)
-_RATIO = 0.8  # Lowe's, of matches
-_POINTS = 3000  # of a photo
-_LEAST, _AGREE = 12, 0.15  # matches that agree, and share of all: fewer do by chance
-_SCALES = (1.6, 2.5)  # up to which scenes in metres and others may differ; guessed ones too, if need be
-_NEAR = 0.12  # m: how well they agree
-_TRIES = 4000
 
 
 @dataclass(frozen=True)
@@ -68,11 +63,11 @@ def aligned(first: Inventory, second: Inventory, render: Render) -> Fit:
     ours, theirs = _matched(_described(first, render), _described(second, render))
     metres = first.unit == second.unit == "m"
     told = metres and not (first.guess or second.guess)
-    for most in _SCALES if metres else _SCALES[1:]:
+    for most in ALIGNMENT.scales if metres else ALIGNMENT.scales[1:]:
         fit = _fitted(ours, theirs, first.metre, most)
-        if fit is None or fit.matches < max(_LEAST, _AGREE * fit.tried):
+        if fit is None or fit.matches < max(ALIGNMENT.least, ALIGNMENT.agree * fit.tried):
             continue
-        if told and most > _SCALES[0]:
+        if told and most > ALIGNMENT.scales[0]:
             times = max(fit.scale, 1 / fit.scale)
             raise InputError(
                 f"lengths were told for both scenes, and they differ by {times:.1f} times; tell them again"
@@ -85,7 +80,7 @@ def _described(found: Inventory, render: Render) -> tuple[np.ndarray, np.ndarray
     """Places (n, 3) in the world of all photos' key points, and their descriptors (n, 128)."""
     places: list[np.ndarray] = [np.zeros((0, 3))]
     descriptors: list[np.ndarray] = [np.zeros((0, 128), np.float32)]
-    sift = cv2.SIFT.create(_POINTS, contrastThreshold=0.01)
+    sift = cv2.SIFT.create(ALIGNMENT.points, contrastThreshold=0.01)
     for view, photo in enumerate(found.scene.photos):
         try:
             with opened_picture(photo, STORED) as opened:
@@ -112,7 +107,7 @@ def _world_places(
     columns, rows = pixels.astype(int).T
     columns, rows = columns.clip(0, camera.width - 1), rows.clip(0, camera.height - 1)
     depths = frame.depths.cpu().double().numpy()[rows, columns]
-    covered = frame.alphas.cpu().numpy()[rows, columns] >= COVERED_ALPHA
+    covered = frame.alphas.cpu().numpy()[rows, columns] >= ANSWERING.covered_alpha
     rays = np.concatenate((pixels, np.ones((len(pixels), 1))), 1) @ np.linalg.inv(camera.K.double().numpy()).T
     pose = invert_rigid(camera.viewmat.double()).cpu().numpy()
     points = (rays * depths[:, None]) @ pose[:3, :3].T + pose[:3, 3]
@@ -132,7 +127,7 @@ def _matched(ours, theirs) -> tuple[np.ndarray, np.ndarray]:
     there = {
         m.queryIdx: m.trainIdx
         for m, n in matcher.knnMatch(ours[1], theirs[1], k=2)
-        if m.distance < _RATIO * n.distance
+        if m.distance < ALIGNMENT.ratio * n.distance
     }
     back = {m.queryIdx: m.trainIdx for (m,) in matcher.knnMatch(theirs[1], ours[1], k=1)}
     both = [(a, b) for a, b in there.items() if back.get(b) == a]
@@ -141,14 +136,17 @@ def _matched(ours, theirs) -> tuple[np.ndarray, np.ndarray]:
 
 
 def _fitted(
-    ours: Float[np.ndarray, "n 3"], theirs: Float[np.ndarray, "n 3"], metre: float, most: float = _SCALES[1]
+    ours: Float[np.ndarray, "n 3"],
+    theirs: Float[np.ndarray, "n 3"],
+    metre: float,
+    most: float = ALIGNMENT.scales[1],
 ) -> Fit | None:
     """The quarter turn, scale (1 / `most` to `most`) and shift that most matches agree with, then exact on
     those."""
     if len(ours) < 2:
         return None
     rng, best, chosen = np.random.default_rng(0), np.zeros(len(ours), bool), None
-    pairs = rng.integers(len(ours), size=(_TRIES, 2))
+    pairs = rng.integers(len(ours), size=(ALIGNMENT.tries, 2))
     for quarter, (a, b) in itertools.product(range(4), pairs):
         turn = Rotation.from_euler("y", 90 * quarter, degrees=True).as_matrix()
         step, own = turn @ (theirs[b] - theirs[a]), ours[b] - ours[a]
@@ -159,13 +157,13 @@ def _fitted(
         if not 1 / most < scale < most:
             continue
         shift = ours[a] - scale * turn @ theirs[a]
-        agree = np.linalg.norm(scale * theirs @ turn.T + shift - ours, axis=1) < _NEAR * metre
+        agree = np.linalg.norm(scale * theirs @ turn.T + shift - ours, axis=1) < ALIGNMENT.near * metre
         if agree.sum() > best.sum():
             best, chosen = agree, turn
     if chosen is None or best.sum() < 3:
         return None
     turn, scale, shift = _similarity(ours, theirs, best, metre)
-    agree = np.linalg.norm(scale * theirs @ turn.T + shift - ours, axis=1) < _NEAR * metre
+    agree = np.linalg.norm(scale * theirs @ turn.T + shift - ours, axis=1) < ALIGNMENT.near * metre
     return Fit(turn, scale, shift, int(agree.sum()), len(ours))
 
 
@@ -185,5 +183,5 @@ def _similarity(ours, theirs, agree, metre: float) -> tuple[np.ndarray, float, n
         turn = (u * signs) @ v
         scale = float((values * signs).sum() / ((b - middle_b) ** 2).sum())
         shift = middle_a - scale * turn @ middle_b
-        agree = np.linalg.norm(scale * theirs @ turn.T + shift - ours, axis=1) < _NEAR * metre
+        agree = np.linalg.norm(scale * theirs @ turn.T + shift - ours, axis=1) < ALIGNMENT.near * metre
     return turn, scale, shift

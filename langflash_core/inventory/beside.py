@@ -6,8 +6,8 @@ see, not by names, which may differ between the scenes: a listed thing of which 
 thing too, since an inventory lists neither what it cannot name nor what it takes for a part of the wall.
 What went from the first scene and what came into the second are paired where they are called the same, or
 language and colours agree, and are about one size: those moved. What is flat is not looked through; there
-a thing of the same kind that is farther than `STAYS` of its own width moved. What no photo of the other scene
-looks at nobody knows.
+a thing of the same kind that is farther than `BESIDE.stays` of its own width moved. What no photo of the
+other scene looks at nobody knows.
 """
 
 import math
@@ -22,25 +22,10 @@ from scipy.spatial import KDTree
 from langflash_core.errors import InputError
 from langflash_core.geometry.harmonics import SH_C0
 from langflash_core.inventory.alignment import Fit, Render, aligned
-from langflash_core.inventory.gone import LEAST, Fate, changes, fate
+from langflash_core.inventory.gone import Fate, changes, fate
+from langflash_core.inventory.settings import BESIDE, GONE
 from langflash_core.inventory.things import OPENINGS, Inventory, Thing, unlisted, unsure
 from langflash_core.scene.thin import covered_areas
-
-STAYS = 0.35
-"""Share of a thing's width by which it may seem to move, and stayed; at least `_STILL`."""
-_STILL = 0.12  # m
-_ALIKE = 0.6  # share by which widths and heights of one thing may differ between two scenes
-_FLAT = 0.12  # m
-_KNOWN, _GONE = 0.3, 0.5
-"""Of a thing's surface: that has to be seen, and of that, what is looked through where the thing is not."""
-_EDGE = 1 / 3
-"""Of a part of the room: where less has gone, that is an edge of it that lies otherwise."""
-_REST = 0.5  # of a change, that is of no listed thing
-_SAME = 1.25
-"""Affinity of looks from which two things may be one: the same one in two scenes has 1.3 to 1.9, others up to
-1.5 (8 rooms beyond those judged)."""
-_LOOKS = 2.0  # m of way, that an affinity lower by 1 weighs as much as
-_TOUCHING = 0.1  # m
 
 
 @dataclass(frozen=True)
@@ -106,25 +91,26 @@ def difference(first: Inventory, second: Inventory, render: Render) -> Differenc
 
 def _absent(found: Inventory, told: Fate) -> list[Thing]:
     """Things that the other scene has not where this one has them; also what no name was given to."""
-    things = [t for t in found.things if _has_gone(found, t, told) and max(t.shares) >= LEAST]
+    things = [t for t in found.things if _has_gone(found, t, told) and max(t.shares) >= GONE.least]
     taken = np.zeros(len(told.gone), bool)
     for thing in things:
         taken |= thing.rows
     for rows in changes(found, told.gone & ~_stands(found, told)):
         left = rows[~taken[rows]]
-        if _fills(found, left) >= max(LEAST, _REST * _fills(found, rows)):
+        if _fills(found, left) >= max(GONE.least, BESIDE.rest * _fills(found, rows)):
             things.append(unlisted(found, left, things))
     return things
 
 
 def _stands(found: Inventory, told: Fate) -> Bool[np.ndarray, " N"]:
-    """Whose part of the room, a thing, wall or floor, is still there: of it less than `_EDGE` has gone."""
+    """Whose part of the room, a thing, wall or floor, is still there: of it less than `BESIDE.edge` has
+    gone."""
     numbers, own = found.parts.numbers, found.shares.sum(0)
     some, count = numbers >= 0, len(found.parts.kinds)
     known, gone = (
         np.bincount(numbers[some], (own * which)[some], count) for which in (told.known, told.gone)
     )
-    return np.append(gone < _EDGE * known, False)[numbers]
+    return np.append(gone < BESIDE.edge * known, False)[numbers]
 
 
 def _rest(
@@ -137,8 +123,8 @@ def _rest(
 
     def piece(thing: Thing) -> bool:
         return any(
-            looks[thing.id].affinity(looks[other.id]) >= _SAME
-            and tree.query(found.stands[thing.rows])[0].min() <= _TOUCHING * metre
+            looks[thing.id].affinity(looks[other.id]) >= BESIDE.same
+            and tree.query(found.stands[thing.rows])[0].min() <= BESIDE.touching * metre
             for other, tree in trees
         )
 
@@ -154,7 +140,7 @@ def _shares(found: Inventory, thing: Thing, told: Fate) -> tuple[float, float]:
 
 def _has_gone(found: Inventory, thing: Thing, told: Fate) -> bool:
     known, gone = _shares(found, thing, told)
-    return thing.kind not in OPENINGS and known >= _KNOWN and gone >= _GONE
+    return thing.kind not in OPENINGS and known >= BESIDE.known and gone >= BESIDE.gone
 
 
 def _fills(found: Inventory, rows: Integer[np.ndarray, " n"]) -> float:
@@ -163,12 +149,12 @@ def _fills(found: Inventory, rows: Integer[np.ndarray, " n"]) -> float:
 
 
 def _still(thing: Thing, metre: float) -> float:
-    return max(_STILL * metre, STAYS * thing.size[0])
+    return max(BESIDE.still * metre, BESIDE.stays * thing.size[0])
 
 
 def _flat(thing: Thing, metre: float) -> bool:
     """Whether what is behind it is too near to be told from it. Doors and windows stay."""
-    return thing.kind not in OPENINGS and min(thing.size) < _FLAT * metre
+    return thing.kind not in OPENINGS and min(thing.size) < BESIDE.flat * metre
 
 
 def _placed(thing: Thing, fit: Fit) -> Thing:
@@ -232,9 +218,9 @@ def _paired(before: Sequence[_Seen], after: Sequence[_Seen], metre: float, *, fa
         for column, other in enumerate(after):
             way = math.dist(one.placed.place, other.placed.place)
             alike, named = one.look.affinity(other.look), one.thing.kind == other.thing.kind
-            same = (named or (far and alike >= _SAME)) and _alike(one.placed, other.placed)
+            same = (named or (far and alike >= BESIDE.same)) and _alike(one.placed, other.placed)
             if same or (not far and way <= _still(one.thing, metre)):
-                costs[row, column] = way / metre + _LOOKS * (2 - alike)
+                costs[row, column] = way / metre + BESIDE.looks * (2 - alike)
     rows, columns = linear_sum_assignment(costs)
     return [
         Pair(before[r].thing, after[c].thing, math.dist(before[r].placed.place, after[c].placed.place))
@@ -248,4 +234,4 @@ def _alike(one: Thing, other: Thing) -> bool:
     if one.cut or other.cut:
         return True
     sides = ((one.size[0], other.size[0]), (one.size[2], other.size[2]))
-    return all(abs(a - b) <= _ALIKE * max(a, b) for a, b in sides)
+    return all(abs(a - b) <= BESIDE.alike * max(a, b) for a, b in sides)

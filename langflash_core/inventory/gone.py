@@ -19,24 +19,12 @@ from scipy.sparse.csgraph import connected_components
 
 from langflash_core.geometry.harmonics import SH_C0
 from langflash_core.inventory.alignment import Fit, Render
+from langflash_core.inventory.settings import GONE
 from langflash_core.inventory.things import Inventory
-from langflash_core.language.answers import COVERED_ALPHA
+from langflash_core.language.settings import ANSWERING
 from langflash_core.scene.instances import touching
 from langflash_core.scene.world import turn_of
 from langflash_core.types import Camera, Scene, Semantics
-
-_BEHIND = (0.03, 0.02)
-"""m, and share of depth: how far behind a surface something else has to be seen. Fits are good to 3 cm."""
-_THERE = (0.08, 0.05)
-"""The same, by which a surface may be off that is still there."""
-_OTHERWISE = 0.6
-"""Cosine of what two places say below which they are of other things: unmoved ones keep .8 and more, those
-that are narrower than a patch of the network .5."""
-_COLOURS = (0.15, 3.0)
-"""How far apart colours are that differ: of 1, and times what is usual between the two scenes."""
-_DARK = 1e-3
-LEAST = 0.01
-"""Of a photo: smaller changes are edges that lie otherwise. Chosen on eight rooms beyond those judged."""
 
 
 @dataclass(frozen=True)
@@ -81,22 +69,22 @@ def _judged(sights: list[_Sight], colours: Float[np.ndarray, "N 3"]) -> Fate:
     differ = _differ(sights, colours)
     known, gone = np.zeros(len(colours), bool), np.zeros(len(colours), bool)
     for sight in sights:
-        known |= sight.met & (sight.behind >= -_spare(sight, _THERE))
-        another = (sight.cosines < _OTHERWISE) | differ(sight)
-        gone |= sight.met & (sight.behind > _spare(sight, _BEHIND)) & another
+        known |= sight.met & (sight.behind >= -_spare(sight, GONE.there))
+        another = (sight.cosines < GONE.otherwise) | differ(sight)
+        gone |= sight.met & (sight.behind > _spare(sight, GONE.behind)) & another
     return Fate(known, gone)
 
 
 def _differ(sights: list[_Sight], colours: Float[np.ndarray, "N 3"]) -> Callable[[_Sight], np.ndarray]:
     """Tells (N,) whose colours a photo does not show, each channel by its brightness in both scenes."""
-    there = [sight.met & (np.abs(sight.behind) <= _spare(sight, _THERE)) for sight in sights]
+    there = [sight.met & (np.abs(sight.behind) <= _spare(sight, GONE.there)) for sight in sights]
     shown = np.concatenate([s.colours[same] for s, same in zip(sights, there, strict=True)])
     own = np.concatenate([colours[same] for same in there])
     gains, usual = np.ones(3), 0.0
     if len(own):
-        gains = np.median(own.clip(_DARK), 0) / np.median(shown.clip(_DARK), 0)
+        gains = np.median(own.clip(GONE.dark), 0) / np.median(shown.clip(GONE.dark), 0)
         usual = float(np.median(np.abs(gains * shown - own).mean(1)))
-    limit = max(_COLOURS[0], _COLOURS[1] * usual)
+    limit = max(GONE.colours[0], GONE.colours[1] * usual)
     return lambda sight: np.abs(gains * sight.colours - colours).mean(1) > limit
 
 
@@ -119,7 +107,7 @@ def _sight(
     frame = render(scene, camera)
     assert frame.weight_maps is not None, "render draws weight maps unless told otherwise"
     columns, rows, depth, inside = _pixels(camera, points)
-    met = inside & (frame.alphas.cpu().numpy()[rows, columns] >= COVERED_ALPHA)
+    met = inside & (frame.alphas.cpu().numpy()[rows, columns] >= ANSWERING.covered_alpha)
     chosen, cosines = np.flatnonzero(met), np.zeros(len(points))
     maps = frame.weight_maps.cpu().numpy()[rows[chosen], columns[chosen]].astype(float)
     ids = own.weight_ids.numpy()[chosen]
@@ -180,7 +168,7 @@ def _pixels(
 
 
 def changes(found: Inventory, gone: Bool[np.ndarray, " N"]) -> list[Integer[np.ndarray, " n"]]:
-    """Rows of each change, the largest first: what has gone, touches, and fills `LEAST` of a photo."""
+    """Rows of each change, the largest first: what has gone, touches, and fills `GONE.least` of a photo."""
     starts, others = touching(found.scene.gaussians)
     both = gone[starts] & gone[others]
     graph = coo_matrix((np.ones(int(both.sum()), bool), (starts[both], others[both])), (len(gone), len(gone)))
@@ -191,4 +179,6 @@ def changes(found: Inventory, gone: Bool[np.ndarray, " N"]) -> list[Integer[np.n
         if len(rows)
         else np.zeros(0)
     )
-    return [rows[numbers == number] for number in np.argsort(-sizes, kind="stable") if sizes[number] >= LEAST]
+    return [
+        rows[numbers == number] for number in np.argsort(-sizes, kind="stable") if sizes[number] >= GONE.least
+    ]

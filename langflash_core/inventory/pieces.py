@@ -8,7 +8,8 @@ piece a with all kinds, w_a its share of the photos, and c_ab the mean of both,
     price(a, b) = (w_a max c_a + w_b max c_b - (w_a + w_b) max c_ab) / min(w_a, w_b) >= 0,
 
 what one name costs, in cosines of the smaller piece. The cheapest pair is joined first, until none costs less
-than a share of the cosine from which a phrase counts as present: `THINGS` between two things, `ROOM` between
+than a share of the cosine from which a phrase counts as present: `PRESENCE.things` between two things,
+    `PRESENCE.room` between
 a thing and a wall, floor or ceiling. Pieces that touch with little of their borders stay apart.
 
 Sizes: N Gaussians, G kinds, n pieces, m pairs. Source: own, after the joining of regions by Ward 1963.
@@ -23,6 +24,7 @@ from jaxtyping import Float, Integer
 from scipy.sparse import coo_matrix, csr_matrix
 from scipy.sparse.csgraph import connected_components
 
+from langflash_core.inventory.settings import PRESENCE
 from langflash_core.language.gaussians import gaussian_relevance
 from langflash_core.language.relevance import compile_query
 from langflash_core.language.spaces import language_space
@@ -32,11 +34,6 @@ from langflash_core.types import Scene
 
 STRUCTURE = ("wall", "floor", "ceiling")
 """Kinds that rooms are made of: no things."""
-THINGS, ROOM = 0.5, 0.2
-"""Shares of the cosine from which a phrase is present. Chosen on 18 rooms beyond those that are judged."""
-CONTACT = 0.1
-"""Of the smaller one's border, by which two pieces have to touch."""
-_LEAST = 1e-4  # of a photo: smaller pieces are of nothing
 
 
 @dataclass(frozen=True)
@@ -71,7 +68,7 @@ def parts_of_room(scene: Scene, shares: Float[np.ndarray, " N"]) -> Parts:
     places = (shares[some], (numbers[some], np.flatnonzero(some)))
     means = csr_matrix(places, (count, len(numbers))) @ cosines.T / masses[:, None]
     pieces = Pieces(masses, means, _contacts(numbers, starts, others))
-    into = pieces.joined(THINGS * compiled.threshold, ROOM * compiled.threshold)
+    into = pieces.joined(PRESENCE.things * compiled.threshold, PRESENCE.room * compiled.threshold)
     kept, into = np.unique(into, return_inverse=True)
     best = pieces.means[kept]
     kinds = tuple(names[kind] for kind in best.argmax(1)) if len(kept) else ()
@@ -94,7 +91,7 @@ def _pieces(
     size = (len(kinds), len(kinds))
     graph = coo_matrix((np.ones(int(same.sum()), bool), (starts[same], others[same])), size)
     numbers = connected_components(graph, directed=False)[1]
-    large = np.bincount(numbers, shares) >= _LEAST
+    large = np.bincount(numbers, shares) >= PRESENCE.least
     return np.where(large, large.cumsum() - 1, -1)[numbers]
 
 
@@ -156,7 +153,7 @@ class Pieces:
     def _offer(self, piece: int, things: float, room: float, after: int = -1) -> None:
         """Put its pairs into the queue that may be joined."""
         for other, contact in self.near[piece].items():
-            if other <= after or contact < CONTACT * min(self._border(piece), self._border(other)):
+            if other <= after or contact < PRESENCE.contact * min(self._border(piece), self._border(other)):
                 continue
             none = [bool(self._structure[self.means[each].argmax()]) for each in (piece, other)]
             if all(none):  # no things, whatever they are joined to

@@ -4,8 +4,8 @@ Walls are planes: what answers "wall", "door" or "window" and is upright lies, s
 along two directions across each other. Their common turn is the mean of the normals' azimuths, modulo a
 quarter; along it and across it a histogram of offsets has a peak a wall. A piece weighs its area over its
 distance from the nearest photo, since depth errs with that. A wall reaches as far as its points do, over gaps
-of `_GAP`, and to the wall it meets. What is short, or small and not seen down to the floor, may be no wall,
-and is none where a thing stands across it.
+of `FLOOR_PLAN.gap`, and to the wall it meets. What is short, or small and not seen down to the floor, may be
+no wall, and is none where a thing stands across it.
 
 Lengths are in the inventory's unit; places are (east, north). Sizes: n points.
 """
@@ -19,28 +19,12 @@ from scipy.ndimage import gaussian_filter1d
 from scipy.spatial import KDTree
 
 from langflash_core.base.records import Guess
+from langflash_core.inventory.settings import FLOOR_PLAN
 from langflash_core.inventory.things import OPENINGS, Inventory, Thing, kinds_of
 from langflash_core.scene.standing import normals_of
 from langflash_core.scene.thin import covered_areas
 from langflash_core.scene.world import turn_of
 
-# Of a room 4 m across; all are scaled where the unit is no metre.
-_BIN = 0.03  # m of offset
-_BLUR = 0.07  # m, of the histogram
-_THICK = 0.15  # m from a wall's plane, of what belongs to it
-_APART = 0.30  # m between two walls side by side
-_STEP, _GAP, _SHORTEST = 0.10, 1.2, 0.5  # m along a wall
-_MEETS = 0.6  # m by which a wall is lengthened to the wall that it meets
-_LEAST = 0.03  # of the weight of all walls
-_NEAREST = 0.5  # m from a photo: what is nearer weighs no more
-_BESIDE = 0.75  # m from a larger wall along the same piece of floor: what is there stands before it
-_LOW = 0.6  # of the height that walls are seen to: what ends below is furniture
-_UPRIGHT, _FACES = math.sin(math.radians(35)), math.cos(math.radians(40))
-_LONG = 1.2  # m: of 61 longer walls of 14 held-out rooms 53 are true ones, of 23 shorter ones 11
-_FEW = 0.1  # of the weight of all walls: what is less, and
-_DOWN = 0.3  # m over the floor ends higher, is doubted
-_ACROSS = 0.3  # m on either side of a wall, beyond what depth errs: what lies on both goes through it
-_HANGS = 0.45  # m from a wall, of a door or window in it
 _OF_WALLS = ("wall", *OPENINGS)
 
 Place = tuple[float, float]  # east, north
@@ -124,7 +108,7 @@ def goes_through(thing: Thing, wall: PlanWall, metre: float) -> bool:
     start, along = np.array(wall.start), (np.array(wall.end) - wall.start) / wall.length
     aside = (thing.corners - start) @ np.array([-along[1], along[0]])
     middle = float((thing.corners.mean(0) - start) @ along)
-    deep = _ACROSS * metre
+    deep = FLOOR_PLAN.across * metre
     return bool(aside.min() < -deep and aside.max() > deep and 0 < middle < wall.length)
 
 
@@ -154,12 +138,17 @@ def _upright_pieces(found: Inventory, metre: float) -> _Pieces:
     flat = normals[:, [0, 2]]
     length = np.linalg.norm(flat, axis=1)
     kinds, areas = kinds_of(scene), covered_areas(scene.gaussians)
-    chosen = np.isin(kinds, _OF_WALLS) & (np.abs(normals[:, 1]) < _UPRIGHT) & (length > 0.5) & (areas > 0)
+    chosen = (
+        np.isin(kinds, _OF_WALLS)
+        & (np.abs(normals[:, 1]) < FLOOR_PLAN.upright)
+        & (length > 0.5)
+        & (areas > 0)
+    )
     chosen &= np.isfinite(found.stands).all(1)
     stands = found.stands[chosen]
     places, weights = stands[:, [0, 2]], areas[chosen]
     if eyes := _eyes(found):
-        weights = weights / np.maximum(KDTree(eyes).query(places)[0], _NEAREST * metre)
+        weights = weights / np.maximum(KDTree(eyes).query(places)[0], FLOOR_PLAN.nearest * metre)
     return _Pieces(places, flat[chosen] / length[chosen, None], -stands[:, 1], weights)
 
 
@@ -178,18 +167,21 @@ def _walls(pieces: _Pieces, metre: float) -> list[PlanWall]:
     """Walls along both axes, the largest first."""
     walls: list[PlanWall] = []
     total = float(pieces.weights.sum())
-    tall = _LOW * weighted_quantile(pieces.heights, pieces.weights, 0.9) if total else 0.0
+    tall = FLOOR_PLAN.low * weighted_quantile(pieces.heights, pieces.weights, 0.9) if total else 0.0
     for axis in (0, 1):
-        facing = np.abs(pieces.normals[:, axis]) >= _FACES
+        facing = np.abs(pieces.normals[:, axis]) >= FLOOR_PLAN.faces
         offsets, along = pieces.places[facing, axis], pieces.places[facing, 1 - axis]
         weights, heights = pieces.weights[facing], pieces.heights[facing]
-        for offset in _peaks(offsets, weights, metre, _LEAST * total):
-            near = np.abs(offsets - offset) <= _THICK * metre
+        for offset in _peaks(offsets, weights, metre, FLOOR_PLAN.least * total):
+            near = np.abs(offsets - offset) <= FLOOR_PLAN.thick * metre
             exact = weighted_quantile(offsets[near], weights[near], 0.5)
             for low, high in _runs(along[near], weights[near], metre):
                 own = near & (along >= low) & (along <= high)
                 share = float(weights[own].sum()) / total
-                if share >= _LEAST / 2 and weighted_quantile(heights[own], weights[own], 0.9) >= tall:
+                if (
+                    share >= FLOOR_PLAN.least / 2
+                    and weighted_quantile(heights[own], weights[own], 0.9) >= tall
+                ):
                     ends = ((exact, low), (exact, high)) if axis == 0 else ((low, exact), (high, exact))
                     down = weighted_quantile(heights[own], weights[own], 0.02) / metre
                     walls.append(PlanWall(*ends, share, _doubt((high - low) / metre, down, share)))
@@ -199,15 +191,15 @@ def _walls(pieces: _Pieces, metre: float) -> list[PlanWall]:
 
 def _doubt(length: float, down: float, share: float) -> str:
     """Why a wall may be none, or "". length, down: m; the latter of its lower end over the floor."""
-    if length < _LONG:
+    if length < FLOOR_PLAN.long:
         return "it is short"
-    return "no photo shows it down to the floor" if share < _FEW and down > _DOWN else ""
+    return "no photo shows it down to the floor" if share < FLOOR_PLAN.few and down > FLOOR_PLAN.down else ""
 
 
 def _before(wall: PlanWall, larger: PlanWall, metre: float) -> bool:
     """Whether it stands close before a larger one, over most of its own length."""
     axis = _axis(wall)
-    if axis != _axis(larger) or abs(wall.start[axis] - larger.start[axis]) > _BESIDE * metre:
+    if axis != _axis(larger) or abs(wall.start[axis] - larger.start[axis]) > FLOOR_PLAN.beside * metre:
         return False
     low = max(wall.start[1 - axis], larger.start[1 - axis])
     high = min(wall.end[1 - axis], larger.end[1 - axis])
@@ -215,33 +207,33 @@ def _before(wall: PlanWall, larger: PlanWall, metre: float) -> bool:
 
 
 def _peaks(offsets: np.ndarray, weights: np.ndarray, metre: float, least: float) -> list[float]:
-    """Offsets of walls, the heaviest first, none nearer than `_APART` to a heavier one."""
+    """Offsets of walls, the heaviest first, none nearer than `FLOOR_PLAN.apart` to a heavier one."""
     if not len(offsets):
         return []
-    step = _BIN * metre
+    step = FLOOR_PLAN.bin * metre
     start = float(offsets.min()) - 3 * step
     counts = np.bincount(((offsets - start) / step).astype(int), weights)
-    smooth = gaussian_filter1d(np.pad(counts, 4), _BLUR / _BIN, mode="constant")
+    smooth = gaussian_filter1d(np.pad(counts, 4), FLOOR_PLAN.blur / FLOOR_PLAN.bin, mode="constant")
     chosen: list[float] = []
     for row in np.argsort(-smooth, kind="stable"):
         place = start + (row - 4 + 0.5) * step
-        mass = float(weights[np.abs(offsets - place) <= _THICK * metre].sum())
+        mass = float(weights[np.abs(offsets - place) <= FLOOR_PLAN.thick * metre].sum())
         if smooth[row] <= 0 or len(chosen) > 20:
             break
-        if mass >= least and all(abs(place - other) >= _APART * metre for other in chosen):
+        if mass >= least and all(abs(place - other) >= FLOOR_PLAN.apart * metre for other in chosen):
             chosen.append(place)
     return chosen
 
 
 def _runs(along: np.ndarray, weights: np.ndarray, metre: float) -> list[tuple[float, float]]:
     """From where to where a wall's points reach, in pieces where it stops for long."""
-    step = _STEP * metre
+    step = FLOOR_PLAN.step * metre
     start = float(along.min())
     counts = np.bincount(((along - start) / step).astype(int), weights)
     full = np.flatnonzero(counts > 0.1 * np.median(counts[counts > 0]))
-    parts = np.split(full, np.flatnonzero(np.diff(full) * step > _GAP * metre) + 1)
+    parts = np.split(full, np.flatnonzero(np.diff(full) * step > FLOOR_PLAN.gap * metre) + 1)
     runs = [(start + part[0] * step, start + (part[-1] + 1) * step) for part in parts if len(part)]
-    return [(low, high) for low, high in runs if high - low >= _SHORTEST * metre]
+    return [(low, high) for low, high in runs if high - low >= FLOOR_PLAN.shortest * metre]
 
 
 def _met(walls: list[PlanWall], metre: float) -> list[PlanWall]:
@@ -255,14 +247,14 @@ def _met(walls: list[PlanWall], metre: float) -> list[PlanWall]:
                 other.start[1 - axis]
                 for other in walls
                 if _axis(other) != axis
-                and abs(other.start[1 - axis] - end[1 - axis]) <= _MEETS * metre
-                and min(other.start[axis], other.end[axis]) - _MEETS * metre
+                and abs(other.start[1 - axis] - end[1 - axis]) <= FLOOR_PLAN.meets * metre
+                and min(other.start[axis], other.end[axis]) - FLOOR_PLAN.meets * metre
                 <= wall.start[axis]
-                <= max(other.start[axis], other.end[axis]) + _MEETS * metre
+                <= max(other.start[axis], other.end[axis]) + FLOOR_PLAN.meets * metre
             ]
             place = min(near, key=lambda value: abs(value - end[1 - axis])) if near else end[1 - axis]
             ends.append((end[0], place) if axis == 0 else (place, end[1]))
-        if math.dist(*ends) >= _SHORTEST * metre / 2:
+        if math.dist(*ends) >= FLOOR_PLAN.shortest * metre / 2:
             met.append(replace(wall, start=ends[0], end=ends[1]))
     return met
 
@@ -289,7 +281,7 @@ def _in_wall(thing: Thing, walls: list[PlanWall], metre: float) -> tuple[Place, 
         across = abs(float(along[0] * aside[1] - along[1] * aside[0]))
         reach = np.abs((thing.corners - middle) @ along).max()
         if (
-            across <= _HANGS * metre
+            across <= FLOOR_PLAN.hangs * metre
             and -reach <= place <= wall.length + reach
             and (best is None or across < best[0])
         ):

@@ -2,8 +2,8 @@
 
 Pieces that touch are one thing where one name of the vocabulary does for all of them
 (`langflash_core/inventory/pieces.py`), and it counts where it answers that name. Things stand upright: a box
-has a height and a rectangle on the floor, along the walls unless another turn saves `_SAVES` of its area.
-Sizes are those of what photos saw: the back of a cupboard that nobody saw is not measured.
+has a height and a rectangle on the floor, along the walls unless another turn saves `LISTING.saves` of its
+area. Sizes are those of what photos saw: the back of a cupboard that nobody saw is not measured.
 
 Lengths are metres where the scene's scale is known or guessed, else scene units. World: +x east, +y down,
 +z north, the floor at y = 0 (`langflash_core.base.records.World`). Sizes: N Gaussians, G kinds, V views.
@@ -26,9 +26,10 @@ from langflash_core.errors import InputError
 from langflash_core.export import opened
 from langflash_core.inventory.apart import DEEPEST, taken_apart
 from langflash_core.inventory.pieces import STRUCTURE, Parts, parts_of_room
-from langflash_core.language.answers import BOX_QUANTILES
+from langflash_core.inventory.settings import LISTING
 from langflash_core.language.gaussians import gaussian_relevance
 from langflash_core.language.relevance import compile_query
+from langflash_core.language.settings import ANSWERING
 from langflash_core.language.spaces import language_space
 from langflash_core.language.vocabulary import OWN
 from langflash_core.level import found_world, metres_of
@@ -40,12 +41,6 @@ from langflash_core.surface.fused import fused_rows, told_in_layers
 from langflash_core.types import Scene, Segments
 
 OPENINGS = ("door", "window")
-LEAST_SHARE = 0.003
-"""Of a photo: what no photo shows so large is no thing of an inventory."""
-LEAST_SIZE = 0.05  # m, of the second of a thing's three extents: what is smaller is a crumb or a line
-_OVER = 0.1  # m over the ceiling, from which on nothing stands in the room: depth there errs with its height
-SEEN = 0.0005  # of a photo that shows a thing
-_SAVES = 0.12
 _TURNS = np.radians(np.arange(0.0, 90.0, 3.0))
 
 
@@ -139,11 +134,11 @@ class Inventory:
         seen."""
         ceilings = np.array([kind == "ceiling" for kind in (*self.parts.kinds, "")])[self.parts.numbers]
         heights = -self.stands[ceilings, 1]
-        return float(np.nanmedian(heights)) + _OVER * self.metre if len(heights) else math.inf
+        return float(np.nanmedian(heights)) + LISTING.over * self.metre if len(heights) else math.inf
 
     def holds(self, thing: Thing) -> bool:
         """Whether a thing has a size, and a place in the room: not over its ceiling nor under its floor."""
-        sized = sorted(thing.size)[1] >= LEAST_SIZE * self.metre
+        sized = sorted(thing.size)[1] >= LISTING.least_size * self.metre
         return sized and thing.bottom < self.top and thing.bottom + thing.size[2] > 0
 
     @cached_property
@@ -167,7 +162,7 @@ class Inventory:
 
 @torch.no_grad()
 def inventory(
-    scene: Scene | Path | str, *, threshold: float | None = None, least: float = LEAST_SHARE
+    scene: Scene | Path | str, *, threshold: float | None = None, least: float = LISTING.least_share
 ) -> Inventory:
     """The things of a scene.
 
@@ -199,7 +194,7 @@ def inventory(
 def unsure(whole: Inventory) -> tuple[Thing, ...]:
     """What answers its name too little to be listed, named on from what is."""
     listed = {thing.id for thing in whole.things}
-    return tuple(thing for thing in _things(whole, 0.0, LEAST_SHARE) if thing.id not in listed)
+    return tuple(thing for thing in _things(whole, 0.0, LISTING.least_share) if thing.id not in listed)
 
 
 def unlisted(whole: Inventory, rows: Integer[np.ndarray, " n"], others: Sequence[Thing]) -> Thing:
@@ -309,7 +304,7 @@ def _thing(
     whole: Inventory, id: str, kind: str, sure: float, own: np.ndarray, areas: np.ndarray, seen: np.ndarray
 ) -> Thing:
     """The thing of some rows of the scene."""
-    order = [int(view) for view in np.argsort(-seen, kind="stable") if seen[view] >= SEEN]
+    order = [int(view) for view in np.argsort(-seen, kind="stable") if seen[view] >= LISTING.seen]
     rows = np.zeros(len(areas), bool)
     rows[own] = True
     return Thing(
@@ -333,15 +328,15 @@ def upright_box(
 
     Extents are from the 2nd to the 98th of a hundred points.
     """
-    heights = np.quantile(-points[:, 1], BOX_QUANTILES)
+    heights = np.quantile(-points[:, 1], ANSWERING.box_quantiles)
     flat = points[:, [0, 2]]
     options = []
     for turn in _TURNS:
         axes = np.array([[math.cos(turn), math.sin(turn)], [-math.sin(turn), math.cos(turn)]])
-        low, high = np.quantile(flat @ axes.T, BOX_QUANTILES, axis=0)
+        low, high = np.quantile(flat @ axes.T, ANSWERING.box_quantiles, axis=0)
         options.append((float(np.prod(high - low + 0.02 * (high - low).max())), axes, low, high))
     best = min(range(len(options)), key=lambda k: options[k][0])
-    if options[best][0] > (1 - _SAVES) * options[0][0]:
+    if options[best][0] > (1 - LISTING.saves) * options[0][0]:
         best = 0
     _, axes, low, high = options[best]
     east, north = (low + high) / 2 @ axes

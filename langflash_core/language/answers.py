@@ -13,15 +13,8 @@ from torch import Tensor
 from langflash_core.errors import PromptError
 from langflash_core.geometry.cameras import invert_rigid, transform, unproject
 from langflash_core.language.relevance import CompiledQuery
+from langflash_core.language.settings import ANSWERING
 from langflash_core.types import Camera, Frame, PromptAnswer, QueryResult
-
-COVERED_ALPHA = 0.5  # a pixel shows the scene, rather than the background, from here on
-_PEAK = 0.01  # of relevance
-TOP_FRACTION = 0.001  # of the covered pixels: their mean is the score, so no stray pixel decides
-MIN_AREA = 0.0005  # of all pixels: a smaller mask is noise (154 pixels at 640 x 480)
-BOX_QUANTILES = (0.02, 0.98)  # of the mask's points along each axis: drops edges that bleed in depth
-_PRINCIPAL_GAIN = 0.9  # of the world-axes box's volume, which the principal one must stay below
-_FEW_POINTS = 3  # fewer have no principal axes
 
 
 def answer(
@@ -50,10 +43,10 @@ def answer(
         raise ValueError(f"relevance: expected {expected}, received {tuple(relevance.shape)}")
     limit = compiled.threshold if threshold is None else _checked(threshold, compiled.mode)
     # Without atoms nothing can be there, whatever the threshold.
-    covered = (frame.alphas >= COVERED_ALPHA) & (compiled.factor.shape[0] > 0)  # (H, W)
+    covered = (frame.alphas >= ANSWERING.covered_alpha) & (compiled.factor.shape[0] > 0)  # (H, W)
     scores = presence_scores(relevance, covered)
     masks = (relevance >= limit) & covered
-    found = (scores >= limit) & (masks.flatten(1).float().mean(1) >= MIN_AREA)
+    found = (scores >= limit) & (masks.flatten(1).float().mean(1) >= ANSWERING.min_area)
     masks = masks & found[:, None, None]
     points = world_points(frame.depths, camera)  # (H, W, 3)
     answers = tuple(
@@ -74,7 +67,7 @@ def presence_scores(relevance: Float[Tensor, "P H W"], covered: Bool[Tensor, "H 
     count = inside.shape[1]
     if count == 0:
         return relevance.new_zeros(relevance.shape[0])
-    return inside.topk(math.ceil(TOP_FRACTION * count), dim=1).values.mean(1)
+    return inside.topk(math.ceil(ANSWERING.top_fraction * count), dim=1).values.mean(1)
 
 
 def best_places(
@@ -82,16 +75,16 @@ def best_places(
 ) -> tuple[tuple[float, float, float] | None, ...]:
     """Where each of P maps (P, H, W) is highest among the covered pixels, scene units; None without any.
 
-    Of those within `_PEAK` of the highest it is the one nearest to their middle, not one at an edge.
+    Of those within `ANSWERING.peak` of the highest it is the one nearest to their middle, not one at an edge.
     """
-    covered = frame.alphas >= COVERED_ALPHA
+    covered = frame.alphas >= ANSWERING.covered_alpha
     if not covered.any():
         return (None,) * len(relevance)
     points = world_points(frame.depths, camera).flatten(0, 1)
     rows = covered.flatten().nonzero().squeeze(1)
     places = []
     for values in relevance.flatten(1)[:, rows]:
-        peak = points[rows[values >= values.max() - _PEAK]]
+        peak = points[rows[values >= values.max() - ANSWERING.peak]]
         x, y, z = peak[(peak - peak.median(0).values).norm(dim=1).argmin()].tolist()
         places.append((x, y, z))
     return tuple(places)
@@ -123,13 +116,13 @@ def oriented_box(points: Float[Tensor, "n 3"]) -> dict:
     """
     exact = points.double().cpu()
     candidates = [torch.eye(3, dtype=torch.float64)]
-    if len(exact) >= _FEW_POINTS:
+    if len(exact) >= ANSWERING.few_points:
         candidates.append(principal_axes(exact))
     boxes = [_extents(exact, axes) for axes in candidates]
     sizes = torch.stack([high - low for low, high in boxes])  # (1 or 2, 3)
     # A flat thing has no volume: every side gets a hundredth of the longest one's thickness.
     volumes = (sizes + 0.01 * sizes.amax(1, keepdim=True)).prod(1)
-    best = 1 if len(volumes) > 1 and volumes[1] < _PRINCIPAL_GAIN * volumes[0] else 0
+    best = 1 if len(volumes) > 1 and volumes[1] < ANSWERING.principal_gain * volumes[0] else 0
     low, high = boxes[best]
     center = ((low + high) / 2) @ candidates[best]
     return {"center": center.tolist(), "axes": candidates[best].tolist(), "size": sizes[best].tolist()}
@@ -137,7 +130,7 @@ def oriented_box(points: Float[Tensor, "n 3"]) -> dict:
 
 def _extents(points: Tensor, axes: Tensor) -> tuple[Tensor, Tensor]:
     """Low and high (3,) of points (n, 3) along the rows of `axes`."""
-    low, high = (points @ axes.T).quantile(torch.tensor(BOX_QUANTILES, dtype=points.dtype), dim=0)
+    low, high = (points @ axes.T).quantile(torch.tensor(ANSWERING.box_quantiles, dtype=points.dtype), dim=0)
     return low, high
 
 
@@ -148,7 +141,7 @@ def principal_axes(points: Float[Tensor, "n 3"]) -> Float[Tensor, "3 3"]:
     The largest component of the first two axes is positive, so that they do not flip by chance.
     """
     distances = (points - points.median(dim=0).values).norm(dim=-1)
-    kept = points[distances <= distances.quantile(BOX_QUANTILES[1] - BOX_QUANTILES[0])]
+    kept = points[distances <= distances.quantile(ANSWERING.box_quantiles[1] - ANSWERING.box_quantiles[0])]
     offsets = kept - kept.mean(dim=0)
     vectors = torch.linalg.eigh(offsets.T @ offsets).eigenvectors.T.flip(0)  # rows, longest first
     first, second = (axis * axis[axis.abs().argmax()].sign() for axis in vectors[:2])

@@ -14,8 +14,7 @@ from jaxtyping import Float
 from torch import Tensor
 from torch.nn import functional as F
 
-HIDDEN = 512
-RIDGE = 1e-3
+from langflash_core.language.settings import DECODING
 
 
 def principal(features: Float[Tensor, "n C"], count: int) -> Float[Tensor, "d C"]:
@@ -39,16 +38,16 @@ class Decoder:
 
     @staticmethod
     def fitted(features: Float[Tensor, "n C"], channels: int) -> "Decoder":
-        """Least squares over unit vectors, with `RIDGE` of their mean square on the output."""
+        """Least squares over unit vectors, with `DECODING.ridge` of their mean square on the output."""
         basis = principal(features, channels)
         generator = torch.Generator().manual_seed(channels)
-        hidden = torch.randn(channels, HIDDEN, generator=generator)
-        shift = 0.5 * torch.randn(HIDDEN, generator=generator)
+        hidden = torch.randn(channels, DECODING.hidden, generator=generator)
+        shift = 0.5 * torch.randn(DECODING.hidden, generator=generator)
         coded = features @ basis.T
         units = _lit(coded, hidden, shift).double()
         missing = (F.normalize(features, dim=-1) - F.normalize(coded, dim=-1) @ basis).double()
         normal = units.T @ units
-        normal += RIDGE * normal.diagonal().mean() * torch.eye(HIDDEN, dtype=torch.float64)
+        normal += DECODING.ridge * normal.diagonal().mean() * torch.eye(DECODING.hidden, dtype=torch.float64)
         return Decoder(basis, hidden, shift, torch.linalg.solve(normal, units.T @ missing).float())
 
     def __call__(self, coded: Float[Tensor, "*n d"]) -> Float[Tensor, "*n C"]:

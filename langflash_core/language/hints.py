@@ -15,6 +15,7 @@ from functools import lru_cache
 from langflash_core.errors import PromptError
 from langflash_core.language.algebra import terms
 from langflash_core.language.minilm import load_minilm
+from langflash_core.language.settings import HINTS
 from langflash_core.language.vocabulary import all_phrases
 from langflash_core.types import Scene, Semantics
 
@@ -31,10 +32,6 @@ _BESIDE = re.compile(
     rf"apart from|excluding|without|not|{_IS_NOT}) {_ARTICLE}(?P<less>.+)"
 )
 _SIGNS = re.compile(r"\b(?:sign|poster|sticker|label)s?$")  # "no smoking sign" is a thing
-_SHORTEST, _LONG = 4, 9  # letters of a word that is taken for a slip; from which on two edits are one
-_MOST_WORDS = (
-    2  # of a phrase of the table that is a name: what longer ones say is no thing ("tells the time")
-)
 _ENDINGS = ("s", "es", "ed", "d", "ing", "er", "y")
 
 
@@ -127,19 +124,19 @@ def _words(text: str) -> list[str]:
 def _counted(text: str) -> list[str]:
     """Its longer words; shorter ones, articles among them, only where there is no other."""
     words = _words(text)
-    return [word for word in words if len(word) >= _SHORTEST] or words
+    return [word for word in words if len(word) >= HINTS.shortest] or words
 
 
 def _known(word: str) -> bool:
     there, ours = load_minilm().tokenizer.token_to_id, _household().words
-    stems = (word, *(word.removesuffix(end) for end in _ENDINGS if len(word) - len(end) >= _SHORTEST))
+    stems = (word, *(word.removesuffix(end) for end in _ENDINGS if len(word) - len(end) >= HINTS.shortest))
     return any(there(stem) is not None or stem in ours for stem in stems)
 
 
 def _joined(word: str) -> bool:
     """Whether it is two words of the text model in one."""
     there = load_minilm().tokenizer.token_to_id
-    cuts = range(_SHORTEST, len(word) - _SHORTEST + 1)
+    cuts = range(HINTS.shortest, len(word) - HINTS.shortest + 1)
     return any(there(word[:cut]) is not None and there(word[cut:]) is not None for cut in cuts)
 
 
@@ -148,9 +145,9 @@ def _nearest(word: str, own: frozenset[str]) -> str:
 
     Whoever mistypes a word seldom does so at its first letter.
     """
-    if len(word) < _SHORTEST:
+    if len(word) < HINTS.shortest:
         return ""
-    most, best = 1 + (len(word) >= _LONG), ("", 3)
+    most, best = 1 + (len(word) >= HINTS.long), ("", 3)
     for other in (*_household().names.get(word[0], ()), *sorted(own)):
         near = other[0] == word[0] and len(set(word) ^ set(other)) <= 2 * most >= 2 * abs(
             len(word) - len(other)
@@ -185,6 +182,6 @@ class _Household:
 @lru_cache(maxsize=1)
 def _household() -> _Household:
     phrases = tuple(phrase.lower() for phrase in all_phrases())
-    named = dict.fromkeys(w for p in phrases if len(p.split()) <= _MOST_WORDS for w in _words(p))
+    named = dict.fromkeys(w for p in phrases if len(p.split()) <= HINTS.most_words for w in _words(p))
     names = {letter: tuple(w for w in named if w[0] == letter) for letter in {w[0] for w in named}}
     return _Household(frozenset(phrases), frozenset(w for p in phrases for w in _words(p)), names)

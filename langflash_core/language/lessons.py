@@ -1,11 +1,11 @@
 """What people taught one scene, for other scenes: a personal vocabulary.
 
 A lesson is how a group looks, a vector v (`langflash_core/appearance.py`), with the name that a person gave
-the group and the words that it is not. In another scene the groups that look so, cos(a, v) >= `SAME`, take
-the lesson of the nearest v, as if that person had taught them there (`taught`); what was taught in a scene
-itself goes before.
+the group and the words that it is not. In another scene the groups that look so, cos(a, v) >=
+`LESSON_LIMITS.same`, take the lesson of the nearest v, as if that person had taught them there (`taught`);
+what was taught in a scene itself goes before.
 
-Source: own; `SAME` is measured on real rooms (MEASURED.md, "What is taught in one room").
+Source: own; `LESSON_LIMITS.same` is measured on real rooms (MEASURED.md, "What is taught in one room").
 """
 
 import json
@@ -21,12 +21,10 @@ from langflash_core.base.files import readable_file, write_atomically
 from langflash_core.base.limits import TEXT
 from langflash_core.base.records import Record
 from langflash_core.errors import PromptError
+from langflash_core.language.settings import LESSON_LIMITS
 
-SAME = 0.85
-"""Cosine of looks from which groups of two scenes are taken for the same kind of thing."""
 SUFFIX = ".words.json"
 FORMAT, VERSION = "langflash words", 1
-MOST_LESSONS, MOST_DENIED, LONGEST = 2_000, 64, 500  # LONGEST: characters of a word
 
 
 @dataclass(frozen=True)
@@ -56,8 +54,10 @@ class Lessons:
         """
         _check_network(self.network, newer.network)
         kept = [old for old in self.lessons if not any(_replaces(new, old) for new in newer.lessons)]
-        if len(kept) + len(newer.lessons) > MOST_LESSONS:
-            raise PromptError(f"a vocabulary holds at most {MOST_LESSONS:,} groups; begin another one")
+        if len(kept) + len(newer.lessons) > LESSON_LIMITS.most_lessons:
+            raise PromptError(
+                f"a vocabulary holds at most {LESSON_LIMITS.most_lessons:,} groups; begin another one"
+            )
         return Lessons(self.network, (*kept, *newer.lessons))
 
 
@@ -91,7 +91,7 @@ def fitting(
     vectors = np.stack([one.vector for one in lessons.lessons]).astype(np.float64)
     cosines = rows.astype(np.float64) @ vectors.T  # (K, L)
     places, own = cosines.argmax(1), set(taught)
-    fits = [k for k in range(len(rows)) if cosines[k, places[k]] >= SAME and k not in own]
+    fits = [k for k in range(len(rows)) if cosines[k, places[k]] >= LESSON_LIMITS.same and k not in own]
     return {k: lessons.lessons[int(places[k])] for k in fits}
 
 
@@ -146,8 +146,8 @@ def _parsed(document: Any) -> Lessons:
     if document["format"] != FORMAT or document["version"] != VERSION:
         raise ValueError(f"expected format {FORMAT!r}, version {VERSION}")
     rows, network = document["lessons"], document["network"]
-    if not isinstance(network, str) or not isinstance(rows, list) or len(rows) > MOST_LESSONS:
-        raise ValueError(f"expected a network and at most {MOST_LESSONS} lessons")
+    if not isinstance(network, str) or not isinstance(rows, list) or len(rows) > LESSON_LIMITS.most_lessons:
+        raise ValueError(f"expected a network and at most {LESSON_LIMITS.most_lessons} lessons")
     lessons = tuple(_lesson(row) for row in rows)
     if len({len(one.vector) for one in lessons}) > 1:
         raise ValueError("expected vectors of one length")
@@ -160,19 +160,19 @@ def _lesson(row: Any) -> Lesson:
     if not np.isfinite(length) or abs(length - 1) > 1e-3:  # float32 numbers that were normalised: 1e-6
         raise ValueError("expected unit vectors")
     denied = row.get("denied", [])
-    if not isinstance(denied, list) or len(denied) > MOST_DENIED:
-        raise ValueError(f"expected at most {MOST_DENIED} denied words")
+    if not isinstance(denied, list) or len(denied) > LESSON_LIMITS.most_denied:
+        raise ValueError(f"expected at most {LESSON_LIMITS.most_denied} denied words")
     return Lesson(vector, _word(row.get("name", "")), tuple(map(_word, denied)))
 
 
 def _word(text: Any) -> str:
-    if not isinstance(text, str) or len(text) > LONGEST:
-        raise ValueError(f"expected words of at most {LONGEST} characters")
+    if not isinstance(text, str) or len(text) > LESSON_LIMITS.longest:
+        raise ValueError(f"expected words of at most {LESSON_LIMITS.longest} characters")
     return text.strip()
 
 
 def _replaces(new: Lesson, old: Lesson) -> bool:
-    alike = float(new.vector.astype(np.float64) @ old.vector) >= SAME
+    alike = float(new.vector.astype(np.float64) @ old.vector) >= LESSON_LIMITS.same
     return alike and (not old.name or not new.name or new.name.lower() == old.name.lower())
 
 

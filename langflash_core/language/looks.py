@@ -11,15 +11,12 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
+from langflash_core.language.settings import LOOK
+
 _TO_XYZ = np.array(  # sRGB, D65, IEC 61966-2-1
     [[0.4124, 0.3576, 0.1805], [0.2126, 0.7152, 0.0722], [0.0193, 0.1192, 0.9505]]
 )
 _WHITE = _TO_XYZ.sum(1)
-_BRIGHT = (0.90, 0.98)  # quantiles of brightness between which a picture's white is sought: above are lamps
-_MOST_GAIN = 2.0  # between two channels: a room lit by bulbs of 2700 K under a camera set to daylight has 1.9
-_DIMMEST = 0.15  # linear; a white that is darker is not scaled further: nothing in the picture is white
-_LUMA = (0.2126, 0.7152, 0.0722)
-_SOFT_L, _SOFT_C, _SOFT_H = 12.0, 6.0, 15.0  # widths of the borders: some 5 just noticeable differences
 
 
 @dataclass(frozen=True)
@@ -77,12 +74,12 @@ def room_white(rgb: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "3"]:
     if not len(rgb):
         return np.ones(3)
     light = linear(rgb)
-    brightness = light @ np.array(_LUMA)
-    low, high = np.quantile(brightness, _BRIGHT)
+    brightness = light @ np.array(LOOK.luma)
+    low, high = np.quantile(brightness, LOOK.bright)
     bright = light[(brightness >= low) & (brightness <= high)]
     white = np.median(bright if len(bright) else light, axis=0)
     top = max(float(white.max()), 1e-6)
-    return np.maximum(white, top / _MOST_GAIN) * max(1.0, _DIMMEST / top)
+    return np.maximum(white, top / LOOK.most_gain) * max(1.0, LOOK.dimmest / top)
 
 
 def lab(rgb: Float[np.ndarray, "*n 3"], white: Float[np.ndarray, "3"]) -> Float[np.ndarray, "*n 3"]:
@@ -102,13 +99,13 @@ def looking(colours: Float[np.ndarray, "*n 3"], name: str) -> Float[np.ndarray, 
     """
     look = LOOKS[name]
     lightness, chroma = colours[..., 0], np.hypot(colours[..., 1], colours[..., 2])
-    well = _within(lightness, look.lightness, _SOFT_L) * _within(chroma, look.chroma, _SOFT_C)
+    well = _within(lightness, look.lightness, LOOK.soft_l) * _within(chroma, look.chroma, LOOK.soft_c)
     if look.hue is None:
         return well
     middle, half = sum(look.hue) / 2, (look.hue[1] - look.hue[0]) / 2
     hue = np.degrees(np.arctan2(colours[..., 2], colours[..., 1]))
     away = abs((hue - middle + 180) % 360 - 180) - half
-    return well * np.clip(0.5 - away / _SOFT_H, 0, 1)
+    return well * np.clip(0.5 - away / LOOK.soft_h, 0, 1)
 
 
 def _within(

@@ -24,12 +24,9 @@ from torch.nn.functional import normalize
 from langflash_core.base.resources import asset_path
 from langflash_core.base.shipped import check_shipped
 from langflash_core.errors import PromptError, WeightsError
+from langflash_core.language.settings import MINILM
 
 DIMENSION = 384
-MAX_TOKENS = 256  # the model's declared maximum; longer phrases are cut
-_LAYERS, _HEADS, _HIDDEN_MLP, _NORM_EPS = 6, 12, 1536, 1e-12
-_BATCH = 64  # phrases per pass: bounds the attention memory of a long list
-_SPECIAL_TOKENS = 2  # [CLS] and [SEP]
 
 
 class RowInt8Table(nn.Module):
@@ -61,11 +58,11 @@ class MiniLM(nn.Module):
         )
         # Every token is of type 0, so its type vector is part of the position vector.
         types = _dense(tensors, prefix + "token_type_embeddings.weight")
-        places = _dense(tensors, prefix + "position_embeddings.weight")[:MAX_TOKENS]
+        places = _dense(tensors, prefix + "position_embeddings.weight")[: MINILM.max_tokens]
         self.register_buffer("positions", places + types[0])  # (256, C)
         with torch.device("meta"):  # no random initialisation: the file's tensors are assigned
-            self.norm = nn.LayerNorm(DIMENSION, eps=_NORM_EPS)
-            self.layers = nn.ModuleList(_layer() for _ in range(_LAYERS))
+            self.norm = nn.LayerNorm(DIMENSION, eps=MINILM.norm_eps)
+            self.layers = nn.ModuleList(_layer() for _ in range(MINILM.layers))
         self.load_state_dict(_state(tensors), strict=False, assign=True)
         self.requires_grad_(False).eval()
         self.tokenizer = _prepared(tokenizer)
@@ -83,8 +80,8 @@ class MiniLM(nn.Module):
         embeddings = self.positions.new_zeros(len(tokens), DIMENSION)
         by_length = sorted(range(len(tokens)), key=lambda i: len(tokens[i]))  # little padding per batch
         with torch.no_grad():
-            for start in range(0, len(tokens), _BATCH):
-                chosen = by_length[start : start + _BATCH]
+            for start in range(0, len(tokens), MINILM.batch):
+                chosen = by_length[start : start + MINILM.batch]
                 embeddings[chosen] = self(*_padded([tokens[i] for i in chosen]))
         return embeddings
 
@@ -96,7 +93,7 @@ class MiniLM(nn.Module):
         """
         # Command lines can carry undecodable bytes as lone surrogates, which no tokenizer takes.
         ids = self.tokenizer.encode(text.encode("utf-8", "replace").decode("utf-8")).ids
-        if len(ids) <= _SPECIAL_TOKENS:
+        if len(ids) <= MINILM.special_tokens:
             raise PromptError("a prompt is empty; describe what to look for in a word or a short phrase")
         unknown = self.tokenizer.token_to_id("[UNK]")
         if all(token == unknown for token in ids[1:-1]):
@@ -156,11 +153,11 @@ def read_minilm(weights: Path, vocabulary: Path) -> MiniLM:
 def _layer() -> nn.TransformerEncoderLayer:
     return nn.TransformerEncoderLayer(
         DIMENSION,
-        _HEADS,
-        _HIDDEN_MLP,
+        MINILM.heads,
+        MINILM.hidden_mlp,
         dropout=0.0,
         activation="gelu",  # the exact one
-        layer_norm_eps=_NORM_EPS,
+        layer_norm_eps=MINILM.norm_eps,
         batch_first=True,
         norm_first=False,
     )
@@ -168,7 +165,7 @@ def _layer() -> nn.TransformerEncoderLayer:
 
 def _prepared(tokenizer: Tokenizer) -> Tokenizer:
     """Cut at 256 tokens, and no padding: batches are padded by `_padded` alone."""
-    tokenizer.enable_truncation(MAX_TOKENS)
+    tokenizer.enable_truncation(MINILM.max_tokens)
     tokenizer.no_padding()
     return tokenizer
 
@@ -198,7 +195,7 @@ def _state(tensors: dict[str, Tensor]) -> dict[str, Tensor]:
         "linear2": "output.dense",
         "norm2": "output.LayerNorm",
     }
-    for index in range(_LAYERS):
+    for index in range(MINILM.layers):
         source, target = f"encoder.layer.{index}.", f"layers.{index}."
         for end in ("weight", "bias"):
             joined = (f"{source}attention.self.{part}.{end}" for part in ("query", "key", "value"))

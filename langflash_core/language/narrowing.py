@@ -15,26 +15,13 @@ import torch
 from jaxtyping import Bool, Float, Int
 from torch import Tensor
 
-from langflash_core.language.answers import COVERED_ALPHA, MIN_AREA, world_points
+from langflash_core.language.answers import world_points
 from langflash_core.language.grammar import Modifier, Reading
 from langflash_core.language.looks import LOOKS, lab, looking, room_white
 from langflash_core.language.relevance import CompiledQuery
+from langflash_core.language.settings import ANSWERING, NARROWING
 from langflash_core.language.things import AWAY, UP, Thing, gap, related
 from langflash_core.types import Camera, Frame
-
-SIDE = 320  # pixels, about, of the longer side of the grid in which things are told apart
-_JUMP = 0.06  # of the nearer depth: neighbours that differ by more are of two things
-_MOSTLY = (
-    0.4  # of a thing's surface, from which on it is called by a look: the rest is shade and what lies on it
-)
-_HARDLY = 0.6  # of the look's best thing: less is another look
-_STANDS_OUT = 0.2  # of a thing's surface, from which on it is the one called so where all others have a third
-_MOST_COLOURFUL, _GREY = 0.98, 4.0  # quantile of chroma, and chroma: below, a picture is a grey one
-_CRUMB = 0.05  # of the share of the largest thing: the same chair four times as far away has 0.06
-_EVEN = 0.5  # relevancy of what fits no better than what it is compared with
-_LIKELY = 0.6  # of the way from there to the threshold: so sure must a related thing be where none is surer
-_COSINE = 0.8  # of the threshold, likewise
-_UPRIGHT = 0.2  # length of the view's direction seen from above, below which it looks up or down
 
 
 @dataclass(frozen=True)
@@ -70,7 +57,7 @@ class Sight:
         found = []
         for own in np.split(order, np.flatnonzero(np.diff(numbers[order])) + 1):
             share = float(self.areas[own].sum())
-            if len(own) and share >= MIN_AREA:
+            if len(own) and share >= ANSWERING.min_area:
                 found.append(Thing(own, self.points[own], share, float(self.relevance[head][own].mean())))
         return found
 
@@ -104,19 +91,19 @@ def _looking(things: list[Thing], modifier: Modifier, sight: Sight, head: str) -
     """Things mostly called so; where none is, the one that stands out, as an orange ladder in dim light does;
     else the parts of them that are."""
     chroma = np.hypot(sight.colours[:, 1], sight.colours[:, 2])
-    if LOOKS[modifier.word].hue and np.quantile(chroma, _MOST_COLOURFUL) < _GREY:
+    if LOOKS[modifier.word].hue and np.quantile(chroma, NARROWING.most_colourful) < NARROWING.grey:
         return things, f"its picture has no colours, so nothing here can be told to be {modifier.word}"
     well = [looking(sight.colours[each.rows], modifier.word) for each in things]
     shares = np.array([float(each.mean()) for each in well])
     if modifier.negated:
-        return [each for each, share in zip(things, shares, strict=True) if share < _MOSTLY], ""
+        return [each for each, share in zip(things, shares, strict=True) if share < NARROWING.mostly], ""
     most = max(each.share for each in things)
-    seen = [row for row, each in enumerate(things) if each.share >= _CRUMB * most]
+    seen = [row for row, each in enumerate(things) if each.share >= NARROWING.crumb * most]
     *others, best = sorted(seen, key=lambda row: shares[row])
-    enough = max(_MOSTLY, _HARDLY * float(shares[best]))
+    enough = max(NARROWING.mostly, NARROWING.hardly * float(shares[best]))
     if shares[best] >= enough:
         return [each for each, share in zip(things, shares, strict=True) if share >= enough], ""
-    if others and shares[best] >= max(_STANDS_OUT, 3 * shares[others].max()):
+    if others and shares[best] >= max(NARROWING.stands_out, 3 * shares[others].max()):
         return [things[best]], ""
     members = np.zeros(len(sight.areas), bool)
     for each, own in zip(things, well, strict=True):
@@ -158,7 +145,7 @@ def _measuring(things: list[Thing], modifier: Modifier, sight: Sight, head: str)
 def _seen_well(things: list[Thing]) -> list[Thing]:
     """Without crumbs, which no comparison is about."""
     most = max(each.share for each in things)
-    return [each for each in things if each.share >= _CRUMB * most]
+    return [each for each in things if each.share >= NARROWING.crumb * most]
 
 
 _MEASURES: dict[str, Callable[[Thing], float]] = {
@@ -203,7 +190,11 @@ _CHOOSERS = {
 
 def likely(limit: float, mode: str) -> float:
     """Relevance from which on a related thing may be there."""
-    return _EVEN + _LIKELY * max(limit - _EVEN, 0.0) if mode == "relevancy" else _COSINE * limit
+    return (
+        NARROWING.even + NARROWING.likely * max(limit - NARROWING.even, 0.0)
+        if mode == "relevancy"
+        else NARROWING.cosine * limit
+    )
 
 
 def viewer_axes(viewmat: Float[Tensor, "4 4"], up: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3 3"]:
@@ -211,7 +202,7 @@ def viewer_axes(viewmat: Float[Tensor, "4 4"], up: Float[np.ndarray, "3"]) -> Fl
     rotation = viewmat[:3, :3].double().cpu().numpy()
     ahead, above = rotation[2], -rotation[1]
     level = ahead - (ahead @ up) * up
-    if np.linalg.norm(level) < _UPRIGHT:  # from above: what is above in the picture is away
+    if np.linalg.norm(level) < NARROWING.upright:  # from above: what is above in the picture is away
         level = np.sign(-(ahead @ up)) * (above - (above @ up) * up)
     away = level / max(float(np.linalg.norm(level)), 1e-9)
     return np.stack((np.cross(away, up), up, away))
@@ -269,13 +260,13 @@ class _View:
         from scipy.ndimage import uniform_filter  # .3 s with all of scipy, for what only few phrases ask
 
         height, width = frame.alphas.shape
-        step = max(1, round(max(height, width) / SIDE))
+        step = max(1, round(max(height, width) / NARROWING.side))
         some = slice(step // 2, None, step)
-        shown = (frame.alphas >= COVERED_ALPHA).cpu().numpy()[some, some]
+        shown = (frame.alphas >= ANSWERING.covered_alpha).cpu().numpy()[some, some]
         axes = viewer_axes(camera.viewmat, up)
         eye = camera.viewmat.double().inverse()[:3, 3].cpu().numpy()
         places = world_points(frame.depths.double().cpu(), camera).numpy()[some, some][shown]
-        straight = frame.rgb.cpu() / frame.alphas.cpu().clamp_min(COVERED_ALPHA)[..., None]
+        straight = frame.rgb.cpu() / frame.alphas.cpu().clamp_min(ANSWERING.covered_alpha)[..., None]
         rgb = uniform_filter(straight.numpy(), step + 2, axes=(0, 1))[some, some][shown]
         return _View(
             (height, width),
@@ -307,7 +298,7 @@ class _View:
         starts, ends = list[np.ndarray](), list[np.ndarray]()
         for one, two in _NEIGHBOURS:
             near, far = self.depths[one], self.depths[two]
-            tied = inside[one] & inside[two] & (abs(near - far) <= _JUMP * np.minimum(near, far))
+            tied = inside[one] & inside[two] & (abs(near - far) <= NARROWING.jump * np.minimum(near, far))
             starts.append(numbers[one][tied])
             ends.append(numbers[two][tied])
         pairs = np.concatenate(starts), np.concatenate(ends)

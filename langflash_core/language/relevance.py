@@ -22,19 +22,13 @@ from langflash_core.errors import PromptError, SceneFileError
 from langflash_core.language.algebra import encode_prompts
 from langflash_core.language.grammar import Reading
 from langflash_core.language.hints import hints
-from langflash_core.language.rivals import KIN, alike, rivalry
+from langflash_core.language.rivals import alike, rivalry
+from langflash_core.language.settings import RELEVANCE, RIVALS
 from langflash_core.language.spaces import LanguageSpace, encode_cached
 from langflash_core.language.taught import taught_dictionary
 from langflash_core.types import Scene, Semantics
 
 Mode = Literal["relevancy", "cosine"]
-
-# Pixels with |F| below this are empty: just above the smallest normal float16 (6.1e-5), so that
-# half-precision weight maps, too, have a direction wherever relevance is not 0.
-EMPTY_NORM = 1e-4
-_SAME = 1e-6  # singular values, of the largest: atoms that differ by less, float32's rounding, are the same
-_PIXELS_AT_ONCE = 1 << 13  # 33 KB a phrase: 100 phrases stay in the cache, 2.6 times as quick as 1 << 16
-_ON_A_CARD = 1 << 18  # where starting work costs more than memory: 105 MB for 100 phrases
 
 
 @dataclass(frozen=True)
@@ -198,15 +192,17 @@ def apart(texts: Sequence[str], space: LanguageSpace, phrases: Float[Tensor, "P 
     two = [row for row, text in enumerate(texts) if len(text.split()) == 2]
     if two:
         names = encode_cached(space, space.rivals)
-        own = phrases[two].to(names) @ names.T > KIN
-        joined = encode_cached(space, tuple("".join(texts[row].split()) for row in two)) @ names.T > KIN
+        own = phrases[two].to(names) @ names.T > RIVALS.kin
+        joined = (
+            encode_cached(space, tuple("".join(texts[row].split()) for row in two)) @ names.T > RIVALS.kin
+        )
         kin[two] = (joined & ~own).any(1, keepdim=True) & ~own.any(1, keepdim=True)
     return kin
 
 
 def _in_factor(factor: Tensor, products: Tensor) -> Tensor:
     """x (P, r) with R x = products (K, P), the shortest one; of more atoms than channels the nearest."""
-    inverse = torch.linalg.pinv(factor.detach().to("cpu", torch.float64), rtol=_SAME)
+    inverse = torch.linalg.pinv(factor.detach().to("cpu", torch.float64), rtol=RELEVANCE.same)
     return (inverse @ products.to(inverse)).T.to(factor)
 
 
@@ -235,7 +231,7 @@ def relevancy(
 
 
 def relevance_maps(
-    weight_maps: Float[Tensor, "*at K"], compiled: CompiledQuery, eps: float = EMPTY_NORM
+    weight_maps: Float[Tensor, "*at K"], compiled: CompiledQuery, eps: float = RELEVANCE.empty_norm
 ) -> Float[Tensor, " P *at"]:
     """Relevance of every prompt at every pixel.
 
@@ -256,7 +252,7 @@ def feature_relevance(
     maps: Float[Tensor, "*at d"],
     compiled: CompiledQuery,
     decode: Callable[[Tensor], Tensor],
-    eps: float = EMPTY_NORM,
+    eps: float = RELEVANCE.empty_norm,
 ) -> Float[Tensor, " P *at"]:
     """`relevance_maps` of whatever a decoder makes vectors F of, in the phrases' own numbers.
 
@@ -267,7 +263,7 @@ def feature_relevance(
         ValueError: the vectors have other numbers than the phrases.
     """
     pixels = maps.flatten(0, -2)
-    block = _PIXELS_AT_ONCE if pixels.device.type == "cpu" else _ON_A_CARD
+    block = RELEVANCE.pixels_at_once if pixels.device.type == "cpu" else RELEVANCE.on_a_card
     found = [_relevance(decode(part), compiled, eps) for part in pixels.split(block)]
     return torch.cat(found, -1).unflatten(-1, maps.shape[:-1])
 

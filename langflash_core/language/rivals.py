@@ -16,14 +16,8 @@ from jaxtyping import Bool, Float
 from torch import Tensor
 from torch.nn.functional import normalize
 
+from langflash_core.language.settings import RIVALS
 from langflash_core.language.vocabulary import groups_of
-
-KIN = 0.6
-"""Cosine of texts from which they mean the same: "couch" and "sofa" have .86, "lamp" and "ceiling" .46."""
-BEHIND = 0.4
-"""Of how much a phrase is behind the best other name, what it loses; .3 to .5 are as good on photos."""
-LEAD = 0.09
-"""Cosine that a phrase gets which nothing beats: so the threshold of scores without rivals stays."""
 
 
 def rivalry(
@@ -40,10 +34,10 @@ def rivalry(
     """
     units = normalize(atoms, dim=-1)
     own, others = units @ phrases.T, units @ names.T  # (K, P), (K, V)
-    kin = phrases @ names.T > KIN
+    kin = phrases @ names.T > RIVALS.kin
     kin = kin if alike is None else kin | alike
     best = torch.stack([others.masked_fill(each, -1.0).amax(1) for each in kin], 1)
-    added = LEAD - BEHIND * (best - own).clamp_min(0)
+    added = RIVALS.lead - RIVALS.behind * (best - own).clamp_min(0)
     return torch.where(atoms.norm(dim=-1, keepdim=True) > 0, added, 0.0)
 
 

@@ -7,13 +7,11 @@ from langflash_core.errors import PromptError
 from langflash_core.language.grammar import Reading, read
 from langflash_core.language.hints import hints
 from langflash_core.language.relevance import CompiledQuery, Mode, compile_query
+from langflash_core.language.settings import SPOKEN
 from langflash_core.language.spaces import LanguageSpace, encode_cached
 from langflash_core.language.vocabulary import OWN
 from langflash_core.language.words import nearest_words
 from langflash_core.types import Scene, Semantics
-
-_MOST_OF_A_NAME = 3  # words: longer phrases describe
-_NEAR = 0.5  # cosine: a violin and an instrument have 0.67, a submarine and a sink 0.47
 
 
 def compile_spoken(
@@ -71,11 +69,13 @@ def _unread(reading: Reading) -> str:
 
 def _unknown(reading: Reading, note: str, space: LanguageSpace) -> str:
     """What a head that names no known thing is near to; nothing where something was said of it already."""
-    if reading.known or note or space.name != "minilm" or len(reading.head.split()) > _MOST_OF_A_NAME:
+    if reading.known or note or space.name != "minilm" or len(reading.head.split()) > SPOKEN.most_of_a_name:
         return ""
     words = tuple(OWN)
     (near,) = nearest_words(space.encode([reading.head])[0], words, encode_cached(space, words), 1)
     nearest = (
-        f'the nearest one it knows is "{near.word}"' if near.cosine >= _NEAR else "it knows none that is near"
+        f'the nearest one it knows is "{near.word}"'
+        if near.cosine >= SPOKEN.near
+        else "it knows none that is near"
     )
     return f'"{reading.head}" is no thing that this model was taught; {nearest}'

@@ -1,8 +1,9 @@
 """What people teach a scene: names that groups answer to as well, and words that they no longer answer to.
 
 A lesson moves its atom: towards a name t, d' = normalise(d + t); out of a denied word u,
-d' = d - `REFUSED` (d . u) u: beyond a cosine of 0, since negatives may lie below that, too. Atoms that look
-alike are moved along, all the way where they are the same and not at all from a cosine of `ALIKE` down:
+d' = d - `TEACHING.refused` (d . u) u: beyond a cosine of 0, since negatives may lie below that, too. Atoms
+that look alike are moved along, all the way where they are the same and not at all from a cosine of
+`TEACHING.alike` down:
 
     d_j' = normalise(d_j + sum_k s_jk (d_k' - d_k)),
     s_jk = clamp((cos(d_j, d_k) - ALIKE) / (1 - ALIKE), 0, 1).
@@ -21,15 +22,9 @@ from torch import Tensor
 from torch.nn.functional import normalize
 
 from langflash_core.errors import PromptError
+from langflash_core.language.settings import TEACHING
 from langflash_core.language.spaces import LanguageSpace, encode_cached
 from langflash_core.types import Record
-
-ALIKE = 0.9
-"""Cosine of atoms from which a lesson about one is one about the other. In scenes of photos the groups of one
-thing lie above .95, a chair and a sofa below .8."""
-REFUSED = 1.25
-"""How far a group goes out of a denied word. In scenes of photos, with 1 one denial of twelve is not heeded;
-with 2 the group loses half of the other words that it answers (MEASURED.md, "A group that is not a word")."""
 
 
 def taught_dictionary(
@@ -52,7 +47,7 @@ def taught_dictionary(
         [_moved(dictionary[k], *lesson, known, k in record.lone_atoms) for k, lesson in lessons.items()]
     )
     unit = normalize(dictionary, dim=-1)
-    shares = ((unit @ unit[rows].T - ALIKE) / (1 - ALIKE)).clamp(0, 1)
+    shares = ((unit @ unit[rows].T - TEACHING.alike) / (1 - TEACHING.alike)).clamp(0, 1)
     lone = torch.tensor([k in record.lone_atoms for k in lessons], device=dictionary.device)
     shares = torch.where(lone, 0.0, shares)
     spread = normalize(dictionary + shares @ (after - before), dim=-1)
@@ -83,5 +78,5 @@ def _moved(atom: Tensor, name: str, denied: Sequence[str], known: Mapping[str, T
         said = span @ (span.T @ atom)
         if not lone and float((atom - said).norm()) <= 1e-3:  # only the words' other side is left
             return torch.zeros_like(atom)
-        atom = atom - (2 if lone else REFUSED) * said
+        atom = atom - (2 if lone else TEACHING.refused) * said
     return normalize(atom, dim=0) if float(atom.norm()) > 1e-3 else torch.zeros_like(atom)

@@ -10,17 +10,9 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Float, Integer
 
+from langflash_core.language.settings import RELATIONS
+
 RIGHT, UP, AWAY = 0, 1, 2
-_ENDS = (0.05, 0.95)  # quantiles of points that are a thing's ends: edges bleed in depth
-_TOUCH = 0.04  # of the distance from the eye: depth of photos is as wrong, and edges are as far from pixels
-_BESIDE = 0.5  # of the smaller thing's size: how far things stand from each other that are beside each other
-_LEVEL = 0.75  # cosine with up from which a surface carries what stands on it
-_FLAT = 0.1  # of the spread of points around a place: thinner is a plane
-_HANGING = 0.3  # of the distance from the eye: of a lamp below its ceiling
-_MEETS = 0.3  # of the narrower of two things: so much of it the other covers, or is covered by it
-_LEFT = 0.2  # of a thing, below which it is the same as what covers the rest
-_MOST_POINTS = 800  # of a thing
-_MOST_OF_ALL = 4000  # of all that something is related to
 
 
 @dataclass(frozen=True)
@@ -39,22 +31,26 @@ class Thing:
     @cached_property
     def points(self) -> Float[np.ndarray, "n 3"]:
         """Some of its places."""
-        return self.places[:: max(1, len(self.places) // _MOST_POINTS)]
+        return self.places[:: max(1, len(self.places) // RELATIONS.most_points)]
 
     def without(self, other: "Thing") -> "Thing | None":
         """What is left of it where another thing is not; None of what is mostly the other."""
         left = ~np.isin(self.rows, other.rows)
         if left.all():
             return self
-        return replace(self, rows=self.rows[left], places=self.places[left]) if left.mean() >= _LEFT else None
+        return (
+            replace(self, rows=self.rows[left], places=self.places[left])
+            if left.mean() >= RELATIONS.left
+            else None
+        )
 
     @cached_property
     def low(self) -> Float[np.ndarray, "3"]:
-        return np.quantile(self.points, _ENDS[0], axis=0)
+        return np.quantile(self.points, RELATIONS.ends[0], axis=0)
 
     @cached_property
     def high(self) -> Float[np.ndarray, "3"]:
-        return np.quantile(self.points, _ENDS[1], axis=0)
+        return np.quantile(self.points, RELATIONS.ends[1], axis=0)
 
     @cached_property
     def middle(self) -> Float[np.ndarray, "3"]:
@@ -78,7 +74,7 @@ class Thing:
     def columns(self) -> tuple[float, float]:
         """Directions of its ends, radians to the right."""
         angles = np.arctan2(self.points[:, RIGHT], self.points[:, AWAY])
-        low, high = np.quantile(angles, _ENDS)
+        low, high = np.quantile(angles, RELATIONS.ends)
         return float(low), float(high)
 
     def away(self, first: float, last: float) -> float:
@@ -95,13 +91,13 @@ class Thing:
     @property
     def touch(self) -> float:
         """How near something is that touches it."""
-        return _TOUCH * self.distance
+        return RELATIONS.touch * self.distance
 
 
 def together(things: list[Thing]) -> Float[np.ndarray, "n 3"]:
     """Some places of several things."""
     places = np.concatenate([each.places for each in things])
-    return places[:: max(1, len(places) // _MOST_OF_ALL)]
+    return places[:: max(1, len(places) // RELATIONS.most_of_all)]
 
 
 def related(thing: Thing, relation: str, others: list[list[Thing]]) -> bool:
@@ -149,11 +145,11 @@ def _on(thing: Thing, places: Float[np.ndarray, "n 3"]) -> bool:
     if normal is None:
         return bool(above)
     upright = abs(normal[UP])
-    if upright >= _LEVEL:
+    if upright >= RELATIONS.level:
         return bool(above and thing.low[UP] >= height - thing.sizes[UP] / 2 - thing.touch)
     off = abs((thing.points - near.mean(0)) @ normal)
     flush = float(np.quantile(off, 0.8)) <= 1.5 * thing.touch
-    return bool(flush or (above and upright > 1 - _LEVEL))
+    return bool(flush or (above and upright > 1 - RELATIONS.level))
 
 
 def _hangs(thing: Thing, places: Float[np.ndarray, "n 3"]) -> bool:
@@ -162,7 +158,7 @@ def _hangs(thing: Thing, places: Float[np.ndarray, "n 3"]) -> bool:
     if len(over) < 0.5 * len(places) or np.ptp(over[:, [RIGHT, AWAY]], axis=0).max() < thing.extent:
         return False
     aside = np.hypot(*(over - thing.middle)[:, [RIGHT, AWAY]].T)
-    reach = max(thing.extent, _HANGING * thing.distance)
+    reach = max(thing.extent, RELATIONS.hanging * thing.distance)
     return bool(((aside <= reach) & (over[:, UP] <= thing.high[UP] + reach)).any())
 
 
@@ -171,7 +167,7 @@ def _normal(points: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "3"] | None:
     if len(points) < 3:
         return None
     values, vectors = np.linalg.eigh(np.cov((points - points.mean(0)).T))
-    flat = values[0] <= (2 * _FLAT) ** 2 * values[1] if values[1] > 0 else False
+    flat = values[0] <= (2 * RELATIONS.flat) ** 2 * values[1] if values[1] > 0 else False
     return vectors[:, 0] if flat else None
 
 
@@ -196,7 +192,7 @@ def _under(thing: Thing, other: Thing) -> bool:
 
 def _beside(thing: Thing, other: Thing) -> bool:
     """Near it, at about its height, and neither on top of it nor under it."""
-    near = max(_BESIDE * min(thing.extent, other.extent), thing.touch)
+    near = max(RELATIONS.beside * min(thing.extent, other.extent), thing.touch)
     apart = max(thing.low[UP] - other.high[UP], other.low[UP] - thing.high[UP])
     return bool(apart <= -thing.touch / 2) and gap(thing, [other]) <= near
 
@@ -219,7 +215,7 @@ def _before(thing: Thing, other: Thing) -> bool:
     as it is behind the ladder, not as its middle is."""
     ends = max(thing.columns[0], other.columns[0]), min(thing.columns[1], other.columns[1])
     narrower = min(each.columns[1] - each.columns[0] for each in (thing, other))
-    if ends[1] - ends[0] < _MEETS * narrower:
+    if ends[1] - ends[0] < RELATIONS.meets * narrower:
         return False
     return thing.away(*ends) < other.away(*ends) - thing.touch / 2
 

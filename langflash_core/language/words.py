@@ -7,7 +7,8 @@ import torch
 from jaxtyping import Float
 from torch import Tensor
 
-from langflash_core.language.relevance import EMPTY_NORM, CompiledQuery, reduce_dictionary
+from langflash_core.language.relevance import CompiledQuery, reduce_dictionary
+from langflash_core.language.settings import RELEVANCE
 
 
 @dataclass(frozen=True)
@@ -36,7 +37,7 @@ def nearest_words(
         expected = (len(words), vector.shape[-1])
         raise ValueError(f"embeddings: expected {expected}, received {tuple(embeddings.shape)}")
     norm = float(vector.norm())
-    if not EMPTY_NORM <= norm < float("inf"):
+    if not RELEVANCE.empty_norm <= norm < float("inf"):
         return ()
     cosines = embeddings @ (vector / norm).to(embeddings)
     best: dict[str, NearWord] = {}
@@ -70,7 +71,7 @@ def with_vectors(
     prompts = compiled.prompts.clone()
     for place, vector in vectors.items():
         norm = float(vector.norm())
-        if not 0 <= place < len(prompts) or not EMPTY_NORM <= norm < float("inf"):
+        if not 0 <= place < len(prompts) or not RELEVANCE.empty_norm <= norm < float("inf"):
             raise ValueError(f"vectors: expected a finite vector for place 0 to {len(prompts) - 1}")
         prompts[place] = basis @ (vector / norm).to(basis)
     return replace(compiled, prompts=prompts)

@@ -14,6 +14,7 @@ from langflash_core.errors import InputError
 from langflash_core.geometry.cameras import invert_rigid
 from langflash_core.geometry.harmonics import SH_C0
 from langflash_core.meant import answering
+from langflash_core.mending.settings import CLEANING
 from langflash_core.scene.instances import disc_radii
 from langflash_core.scene.joining import appended
 from langflash_core.splat.visibility import seen_shares
@@ -24,9 +25,6 @@ from .looks import Render
 from .recipes import COLOUR, Box, Recipe, Rule
 from .strength import chosen, kind_strengths
 
-_CORE = 0.01  # share of the places on either side of each axis that the box "core" leaves outside
-_ROOM = 0.1  # of its sides by which the box "room" goes beyond core and photos
-_SEEN = 0.05  # pixels of a photo that a Gaussian makes up: it is seen there
 _ALL = "everything else"
 
 
@@ -84,11 +82,11 @@ def box_of(scene: Scene, crop: str | Box, visible: Bool[np.ndarray, " N"]) -> Bo
     shown = means[visible & np.isfinite(means).all(1)]
     if not len(shown):
         raise InputError("the scene holds nothing that a box could be put around; open another")
-    low, high = np.quantile(shown, _CORE, axis=0), np.quantile(shown, 1 - _CORE, axis=0)
+    low, high = np.quantile(shown, CLEANING.core, axis=0), np.quantile(shown, 1 - CLEANING.core, axis=0)
     if crop == "room":
         eyes = invert_rigid(scene.viewmats.cpu().double())[:, :3, 3].numpy()
         low, high = np.minimum(low, eyes.min(0)), np.maximum(high, eyes.max(0))
-        low, high = low - _ROOM * (high - low), high + _ROOM * (high - low)
+        low, high = low - CLEANING.room * (high - low), high + CLEANING.room * (high - low)
     (a, b, c), (d, e, f) = low.tolist(), high.tolist()
     return a, b, c, d, e, f
 
@@ -105,7 +103,7 @@ def meeting(
     """Gaussians of which all conditions of a rule hold.
 
     Args:
-        measure: `measured` of the scene by name, where somebody remembers it; None: it is measured here.
+        measure: `measured` of the scene by name, where they are remembered; None: measured here.
 
     Raises:
         InputError: the scene does not know what a condition asks for.
@@ -138,7 +136,7 @@ def measured(scene: Scene, name: str) -> Float[np.ndarray, " N"]:
             return torch.cdist(scene.gaussians.means.cpu().double(), eyes).amin(1).numpy()
         case "photos":
             pixels = scene.view_size[0] * scene.view_size[1]
-            return (seen_shares(scene) * pixels >= _SEEN).sum(0).double().numpy()
+            return (seen_shares(scene) * pixels >= CLEANING.seen).sum(0).double().numpy()
     if scene.confidences is None:
         raise InputError(
             "this scene does not say how sure its depth is; leave the condition on confidence out"

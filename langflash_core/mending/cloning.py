@@ -25,6 +25,7 @@ from torch import Tensor
 
 from langflash_core.errors import InputError
 from langflash_core.geometry.cameras import invert_rigid
+from langflash_core.mending.settings import CLONING
 from langflash_core.scene.changed import changed
 from langflash_core.scene.changes import UNTURNED, Moved, Spot, Turn, turn_about, turn_matrix
 from langflash_core.scene.mask import Mask
@@ -35,17 +36,6 @@ from langflash_core.types import Camera, Gaussians, Scene
 
 from .looks import Render
 from .planes import Plane, planes
-
-SCALES = (0.25, 4.0)  # of copies that are to be as close together as what is there
-_FAR = 0.012  # of the depth: what lies on the surface, as in `filling.py`
-_FLAT = 0.1  # of the brush's radius: what lies on the source's plane
-_SHARE = 0.05  # of the points that a plane holds at the least
-_RELIEF = 0.5  # of the brush's radius: farther from the source's plane is another thing
-_NEAREST = 12  # points round a place: of its plane at the least, and of which a height is the median
-_HALF = 0.5  # of a pixel's light, and of the pixels: there is a surface
-_GRAZING = 0.02
-_AWAY = 1e4  # scene units: where the eye of parallel rays is taken to be
-_RIM = 1.0  # pixels by which copies reach over the edge
 
 
 @dataclass(frozen=True)
@@ -77,7 +67,7 @@ class Stroke:
         K = self.camera.K.cpu().double().numpy()
         x, y = (self.start[0] - K[0, 2]) / K[0, 0], (self.start[1] - K[1, 2]) / K[1, 1]
         if self.camera.orthographic:
-            return pose[:3, :3] @ (x, y, -_AWAY) + pose[:3, 3], pose[:3, 2]
+            return pose[:3, :3] @ (x, y, -CLONING.away) + pose[:3, 3], pose[:3, 2]
         ahead = pose[:3, :3] @ (x, y, 1.0)
         return pose[:3, 3], ahead / np.linalg.norm(ahead)
 
@@ -101,7 +91,7 @@ def clone(
 
     Args:
         visible: (N,) bool, what takes part. source: in the world, scene units. render: draws scenes.
-        fit: copies are scaled, within `SCALES`, until they lie as close together as what is there.
+        fit: copies are scaled, within `CLONING.scales`, until they lie as close together as what is there.
 
     Returns:
         A scene of n > 0 Gaussians of the same dictionary, to be appended, and (N,) bool, to be deleted.
@@ -117,7 +107,7 @@ def clone(
     part = _of_all_layers(shown.rows(torch.from_numpy(near)))
     move = replace(move, rows=Mask.full(len(part.gaussians)))
     laid = _lifted(changed(part.gaussians, (move,)), surface)
-    here = torch.from_numpy(stroke.holds(_centres(laid, stroke.camera), _RIM))
+    here = torch.from_numpy(stroke.holds(_centres(laid, stroke.camera), CLONING.rim))
     if not here.any():
         raise InputError("nothing lies round the source where the brush would copy it; choose another source")
     copies = replace(part.rows(here), gaussians=laid.rows(here))
@@ -158,11 +148,11 @@ def _seen(shown: Scene, stroke: Stroke, render: Render) -> _Seen:
     points, viewmat = gaussians.means.numpy(), camera.viewmat.cpu().double().numpy()
     depths, centres = points @ viewmat[2, :3] + viewmat[2, 3], _centres(gaussians, camera)
     alphas = render(shown, camera, weight_maps=False).alphas.cpu().numpy()[stroke.pixels]
-    closed = bool(alphas.size) and float((alphas >= _HALF).mean()) >= _HALF
+    closed = bool(alphas.size) and float((alphas >= CLONING.half).mean()) >= CLONING.half
     for around in (0.0, 2 * stroke.radius):
         seen = seen_in(shown, np.ones(len(points), bool), camera, stroke.grown(around))
         here = seen & stroke.holds(centres, around)
-        if closed and here.sum() >= _NEAREST:
+        if closed and here.sum() >= CLONING.nearest:
             break
     return _Seen(points, centres, depths, seen, here, shown.layered)
 
@@ -192,14 +182,14 @@ class _Surface:
 
     def height(self, points: Float[np.ndarray, "m 3"]) -> Float[np.ndarray, " m"]:
         """Of the surface over its plane where points are: the median of the nearest ones' heights."""
-        count = min(_NEAREST, len(self.flat))
+        count = min(CLONING.nearest, len(self.flat))
         which = KDTree(self.flat).query(points @ self.plane.basis().T, k=count)[1]
         return np.median(self.heights[np.reshape(which, (-1, count))], axis=1)
 
 
 def _surface(seen: _Seen, stroke: Stroke) -> _Surface:
-    points, slack = seen.points[seen.here], _FAR * seen.depths[seen.here]
-    found = planes(points, slack, share=_SHARE, most=1)
+    points, slack = seen.points[seen.here], CLONING.far * seen.depths[seen.here]
+    found = planes(points, slack, share=CLONING.share, most=1)
     if not found:
         raise InputError("no surface is seen where the brush went; brush over one")
     eye, ahead = stroke.ray()
@@ -219,7 +209,7 @@ def _surface(seen: _Seen, stroke: Stroke) -> _Surface:
 def _covered(seen: _Seen, surface: _Surface, stroke: Stroke) -> Bool[np.ndarray, " N"]:
     """What lies on the surface in the pixels, and what is seen there before it; of layers, all of that."""
     inside, found = stroke.holds(seen.centres), np.zeros(len(seen.points), bool)
-    points, slack = seen.points[inside], 2 * _FAR * seen.depths[inside]
+    points, slack = seen.points[inside], 2 * CLONING.far * seen.depths[inside]
     over = surface.plane.apart(points) - surface.height(points)
     found[inside] = (abs(over) <= slack) | (seen.seen[inside] & ((over > 0) | seen.layered))
     return found
@@ -234,16 +224,18 @@ def _moved(
 ) -> tuple[Bool[np.ndarray, " N"], Moved]:
     """(N,) bool, what lies near enough to the source and its plane; and how that comes to the stroke."""
     brush, apart = surface.unit * radius, np.linalg.norm(points - source, axis=1)
-    least = np.sort(apart)[min(_NEAREST, len(points)) - 1]
+    least = np.sort(apart)[min(CLONING.nearest, len(points)) - 1]
     around = points[apart <= max(brush, least)]
-    found = planes(around, np.full(len(around), _FLAT * max(brush, least)), share=_SHARE, most=1)
+    found = planes(
+        around, np.full(len(around), CLONING.flat * max(brush, least)), share=CLONING.share, most=1
+    )
     if not found:
         raise InputError("nothing lies round the source; choose another source")
     base, scale = _facing(found[0], surface.eye), 1.0
     if fit:
-        scale = float(np.clip(surface.spacing / max(spacing(around), 1e-12), *SCALES))
+        scale = float(np.clip(surface.spacing / max(spacing(around), 1e-12), *CLONING.scales))
     foot = source - _apart(base, source) * base.normal
-    near = abs(base.apart(points)) <= max(_RELIEF * brush / scale, _FLAT * least)
+    near = abs(base.apart(points)) <= max(CLONING.relief * brush / scale, CLONING.flat * least)
     near &= np.linalg.norm(points - foot, axis=1) <= surface.far / scale
     turn = _smallest_turn(base, surface.plane)
     offset = surface.start - scale * turn_matrix(turn) @ foot
@@ -274,7 +266,7 @@ def _meeting(
 ) -> Float[np.ndarray, " 3"] | None:
     """Where a ray meets a plane; None where it hardly does."""
     down = float(ahead @ plane.normal)
-    return eye - _apart(plane, eye) / down * ahead if down < -_GRAZING else None
+    return eye - _apart(plane, eye) / down * ahead if down < -CLONING.grazing else None
 
 
 def _smallest_turn(base: Plane, plane: Plane) -> Turn:

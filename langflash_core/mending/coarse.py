@@ -22,17 +22,10 @@ from torch.nn.functional import normalize
 
 from langflash_core.geometry.harmonics import SH_C0, colour_to_sh
 from langflash_core.geometry.quaternions import matrices_to_quats
+from langflash_core.mending.settings import COARSENING
 from langflash_core.scene.thin import covered_areas
 from langflash_core.scene.weights import renormalised, sparse_weights
 from langflash_core.types import Gaussians, Scene, Semantics
-
-LEVELS = 16  # of a colour
-OPACITY = 0.99
-_PLACES = 8  # that a block's side is parted into
-_COVER = 0.85  # deviation of a Gaussian over its spacing: closed (surface/elements.py)
-_THIN = 0.1
-_TILES = 6  # along the side of a block
-_AROUND = 8  # blocks that run into each other
 
 
 @dataclass(frozen=True)
@@ -83,8 +76,8 @@ def coarsened(part: Scene, side: float, *, squares: bool) -> Scene:
 
 
 def quantised(colours: Tensor) -> Tensor:
-    """Colours in [0, 1], each channel one of `LEVELS`."""
-    return (colours.clamp(0, 1) * (LEVELS - 1)).round() / (LEVELS - 1)
+    """Colours in [0, 1], each channel one of `COARSENING.levels`."""
+    return (colours.clamp(0, 1) * (COARSENING.levels - 1)).round() / (COARSENING.levels - 1)
 
 
 def _means_by(cube: Tensor, areas: Tensor, count: int) -> Callable[[Tensor], Tensor]:
@@ -101,7 +94,7 @@ def _means_by(cube: Tensor, areas: Tensor, count: int) -> Callable[[Tensor], Ten
 def _blocks(
     gaussians: Gaussians, mean: Callable[[Tensor], Tensor], cells: np.ndarray, side: float
 ) -> _Blocks:
-    step = side / _PLACES
+    step = side / COARSENING.places
     means = ((mean(gaussians.means) / step).floor() + 0.5) * step
     colours = quantised(mean(0.5 + SH_C0 * gaussians.sh[:, 0]))
     return _Blocks(means, colours, _axes(means, cells), side)
@@ -126,7 +119,7 @@ def _axes(means: Tensor, cells: np.ndarray) -> Tensor:
 def _tiles(blocks: _Blocks, members: Tensor, cube: Tensor) -> tuple[Tensor, Tensor]:
     """Places (n, 3) of tiles on the blocks' planes, a sixth of a block apart, where members (N, 3) of theirs
     lie over them; and the block (n,) of each."""
-    pitch = blocks.side / _TILES
+    pitch = blocks.side / COARSENING.tiles
     apart = torch.einsum("nij,ni->nj", blocks.axes[cube], members - blocks.means[cube])
     sites = torch.cat((cube[:, None], (apart[:, :2] / pitch).round().long()), 1).unique(dim=0)
     of, along = sites[:, 0], sites[:, 1:].double() * pitch
@@ -135,7 +128,7 @@ def _tiles(blocks: _Blocks, members: Tensor, cube: Tensor) -> tuple[Tensor, Tens
 
 def _run_together(blocks: _Blocks, places: Tensor, of: Tensor) -> Tensor:
     """Colours (n, 3) at places, of the blocks around each, by a bell as wide as a block."""
-    near = min(_AROUND, len(blocks.means))
+    near = min(COARSENING.around, len(blocks.means))
     distances, which = KDTree(blocks.means.numpy()).query(places.numpy(), k=near)
     distances, which = np.reshape(distances, (len(of), near)), np.reshape(which, (len(of), near))
     bells = np.exp(-2 * (distances / blocks.side) ** 2) + 1e-12
@@ -143,19 +136,19 @@ def _run_together(blocks: _Blocks, places: Tensor, of: Tensor) -> Tensor:
 
 
 def _flat(blocks: _Blocks, places: Tensor, of: Tensor, colours: Tensor) -> Gaussians:
-    pitch = blocks.side / _TILES
-    scales = pitch * torch.tensor([_COVER, _COVER, _THIN * _COVER])
+    pitch = blocks.side / COARSENING.tiles
+    scales = pitch * torch.tensor([COARSENING.cover, COARSENING.cover, COARSENING.thin * COARSENING.cover])
     return Gaussians(
         means=places.float(),
         quats=matrices_to_quats(blocks.axes)[of].float(),
         scales=scales.repeat(len(of), 1),
-        opacities=torch.full((len(of),), OPACITY),
+        opacities=torch.full((len(of),), COARSENING.opacity),
         sh=colour_to_sh(colours)[:, None].float(),
     )
 
 
 def _semantics(part: Scene, areas: Tensor, cube: np.ndarray, num_blocks: int, of: Tensor) -> Semantics:
-    """Of each block the strongest of its members' mean weights, in `LEVELS`."""
+    """Of each block the strongest of its members' mean weights, in `COARSENING.levels`."""
     semantics = part.semantics
     most = semantics.weight_ids.shape[1]
     if not semantics.num_atoms or not most:
@@ -165,7 +158,7 @@ def _semantics(part: Scene, areas: Tensor, cube: np.ndarray, num_blocks: int, of
     carried = (semantics.weight_values.double() * areas[:, None]).flatten()
     sums = torch.zeros(num_blocks * count, dtype=torch.float64).index_add(0, flat.flatten(), carried)
     ids, values = sparse_weights(sums.view(num_blocks, count).float(), most)
-    values = renormalised((values * (LEVELS - 1)).round())
+    values = renormalised((values * (COARSENING.levels - 1)).round())
     return replace(semantics, weight_ids=ids[of], weight_values=values[of])
 
 

@@ -27,6 +27,7 @@ from langflash_core.geometry.cameras import invert_rigid, rays, transform, unpro
 from langflash_core.geometry.harmonics import colour_to_sh
 from langflash_core.geometry.quaternions import matrices_to_quats
 from langflash_core.geometry.surfels import ellipses, spans
+from langflash_core.mending.settings import FILLING
 from langflash_core.rig.projected import project_points
 from langflash_core.scene.joining import appended
 from langflash_core.scene.weights import sparse_weights
@@ -37,28 +38,7 @@ from .looks import Render, mattes
 from .planes import Plane, planes
 from .texture import healed, spread
 
-OPACITY = 0.99
-_COVER, _THIN = 0.85, 0.1  # deviation over spacing, as elements of a scene have
-_FINER, _MOST_SIDE = 2, 512  # than the views' own grid they are looked at; pixels of the longer side
-_MOST_VIEWS = 12  # with the largest holes
 _BRIGHTEST = EXPOSURE.gain_range[1] + EXPOSURE.largest_offset  # a photo's white in the scene's light
-_LEAST = 12  # pixels of a hole
-_RING = 0.08  # of the longer side: what counts as around
-_FAR = 0.012  # of the depth: what lies on a plane
-_SHARE, _MOST_PLANES = 0.08, 6
-_REACHED = 2.5  # times as far as the nearest surface around: so far a plane goes on
-_BEFORE = 0.97  # of the depth of what was taken away: nearer is no background
-_THROUGH = 1.05  # times as deep: there another view sees through
-_CELL = 1.4  # pixels of a view
-_MOST_CELLS = 150_000
-_BEHIND = 0.3  # of what is around
-_GRAZING = 0.04
-_PARALLEL, _CLOSE = 0.9, 0.8  # planes alike, and so near: the one that more lies on goes on
-_NOISE, _NARROWEST = (
-    3.0,
-    0.25,
-)  # deviations of a plane's own points that still lie on it; tolerances, at the least
-_RARE = 0.2  # of the commonest group's share of a plane: rarer groups are things before it
 
 
 @dataclass(frozen=True)
@@ -118,16 +98,18 @@ def fill(scene: Scene, removed: Tensor, render: Render) -> Scene:
 def _views(scene: Scene, left: Scene, removed: Tensor, render: Render) -> list[_View]:
     cameras = [_resized(scene.camera(view)) for view in range(scene.num_views)]
     shown = mattes(scene, removed, cameras, render)
-    order = sorted(range(len(cameras)), key=lambda view: -float(shown[view][0].sum()))[:_MOST_VIEWS]
+    order = sorted(range(len(cameras)), key=lambda view: -float(shown[view][0].sum()))[: FILLING.most_views]
     found = [
-        _view(left, cameras[v], *shown[v], v, render) for v in order if float(shown[v][0].sum()) >= _LEAST
+        _view(left, cameras[v], *shown[v], v, render)
+        for v in order
+        if float(shown[v][0].sum()) >= FILLING.least
     ]
-    return [view for view in found if view.hole.sum() >= _LEAST]
+    return [view for view in found if view.hole.sum() >= FILLING.least]
 
 
 def _resized(camera: Camera) -> Camera:
     longer = max(camera.width, camera.height)
-    ratio = min(_FINER, max(1, _MOST_SIDE / longer))
+    ratio = min(FILLING.finer, max(1, FILLING.most_side / longer))
     return camera.resized(max(1, round(camera.width * ratio)), max(1, round(camera.height * ratio)))
 
 
@@ -135,7 +117,7 @@ def _view(left: Scene, camera: Camera, matte: Tensor, before: Tensor, number: in
     frame = render(left, camera)
     alphas = frame.alphas.cpu().numpy()
     hole = ((matte.numpy() > 0.1) & (alphas < 0.5)) | ((matte.numpy() >= 0.5) & (alphas < 0.9))
-    size = 2 * max(2, round(_RING * max(hole.shape))) + 1
+    size = 2 * max(2, round(FILLING.ring * max(hole.shape))) + 1
     ring = (cv2.dilate(hole.astype(np.uint8), np.ones((size, size), np.uint8)) > 0) & (alphas >= 0.9) & ~hole
     pose = invert_rigid(camera.viewmat.cpu().double())
     ahead = rays(camera.K.cpu().double(), camera.width, camera.height) @ pose[:3, :3].T
@@ -153,8 +135,8 @@ def _planes_around(views: Sequence[_View]) -> list[Plane]:
     depths = np.concatenate([view.depths[view.ring] for view in views])
     eyes = np.concatenate([np.broadcast_to(view.eye, (int(view.ring.sum()), 3)) for view in views])
     step = max(1, len(points) // 5000)
-    points, eyes, far = points[::step], eyes[::step], _FAR * depths[::step]
-    found = planes(points, far, share=_SHARE, most=_MOST_PLANES)
+    points, eyes, far = points[::step], eyes[::step], FILLING.far * depths[::step]
+    found = planes(points, far, share=FILLING.share, most=FILLING.most_planes)
     return [plane for plane in found if _bounds(plane, points, eyes, far)]
 
 
@@ -166,7 +148,7 @@ def _bounds(
 ) -> bool:
     """Whether little of what is around lies behind a plane, as it does behind a chair's back: it goes on."""
     behind = plane.apart(points) * np.sign(plane.apart(eyes)) < -2 * far
-    return float(behind.mean()) <= _BEHIND
+    return float(behind.mean()) <= FILLING.behind
 
 
 def _on_planes(
@@ -193,7 +175,7 @@ def _chosen(
         return which, depth
     points = view.points(view.depths)
     apart = np.stack([abs(plane.apart(points)) for plane in found])  # (p, H, W)
-    label = np.where(view.ring & (apart.min(0) <= 2 * _FAR * view.depths), apart.argmin(0), -1)
+    label = np.where(view.ring & (apart.min(0) <= 2 * FILLING.far * view.depths), apart.argmin(0), -1)
     any_surface = np.asarray(ndimage.distance_transform_edt(~view.ring))
     for number, plane in enumerate(found):
         if not (label == number).any():
@@ -201,11 +183,12 @@ def _chosen(
         reach = np.asarray(ndimage.distance_transform_edt(label != number))
         down = view.rays @ plane.normal
         hit = (plane.offset - plane.normal @ view.eye) / np.where(abs(down) > 1e-9, down, 1e-9)
-        steep = abs(down) > _GRAZING * np.linalg.norm(view.rays, axis=-1)
-        behind = (hit > _BEFORE * np.where(view.before > 0, view.before, 0)) & (hit > 1e-6)
-        there = view.hole & steep & behind & (reach <= _REACHED * any_surface + 3) & (hit < depth)
-        alike = np.array([abs(plane.normal @ other.normal) > _PARALLEL for other in found])
-        there &= (which < 0) | ~alike[which] | (hit < _CLOSE * depth)  # a curtain's, just before its wall's
+        steep = abs(down) > FILLING.grazing * np.linalg.norm(view.rays, axis=-1)
+        behind = (hit > FILLING.before * np.where(view.before > 0, view.before, 0)) & (hit > 1e-6)
+        there = view.hole & steep & behind & (reach <= FILLING.reached * any_surface + 3) & (hit < depth)
+        alike = np.array([abs(plane.normal @ other.normal) > FILLING.parallel for other in found])
+        # a curtain's, just before its wall's
+        there &= (which < 0) | ~alike[which] | (hit < FILLING.close * depth)
         which[there], depth[there] = number, hit[there]
     return which, depth
 
@@ -220,7 +203,7 @@ def _patch(plane: Plane, spots: Float[np.ndarray, "n 3"], views: Sequence[_View]
     rows, columns = np.indices(shape)
     along = low + pitch * (np.stack((columns, rows), -1) + 0.5)
     points = along @ basis + plane.normal * plane.offset  # (h, w, 3)
-    on_it = _FAR * min(max(_NOISE * plane.noise, _NARROWEST), 2.0)
+    on_it = FILLING.far * min(max(FILLING.noise * plane.noise, FILLING.narrowest), 2.0)
     colours, weights, known, through = _seen(points.reshape(-1, 3), views, on_it)
     known = known if weights is None else known & _common(weights, known)
     known, through = (each.reshape(shape) for each in (known, through))
@@ -235,7 +218,7 @@ def _patch(plane: Plane, spots: Float[np.ndarray, "n 3"], views: Sequence[_View]
         )
     carried = None if weights is None else weights.reshape(*shape, -1)[nearest[0][hole], nearest[1][hole]]
     axes = np.broadcast_to(np.stack((*basis, np.cross(*basis)), -1), (int(hole.sum()), 3, 3))
-    sizes = np.full((len(axes), 2), pitch * _COVER)
+    sizes = np.full((len(axes), 2), pitch * FILLING.cover)
     return _elements(none, points[hole], axes, sizes, coloured[hole], carried, views[0].number)
 
 
@@ -247,11 +230,11 @@ def _raster(
     basis = plane.basis()
     flat = spots @ basis.T
     nearest = min(float(np.median(np.linalg.norm(spots - view.eye, axis=1))) for view in views)
-    pitch = _CELL * nearest / float(views[0].camera.K[0, 0])
+    pitch = FILLING.cell * nearest / float(views[0].camera.K[0, 0])
     low, high = np.quantile(flat, 0.002, axis=0), np.quantile(flat, 0.998, axis=0)
     margin = 0.6 * float((high - low).max()) + 8 * pitch
     low, high = low - margin, high + margin
-    pitch = max(pitch, float(np.sqrt(np.prod(high - low) / _MOST_CELLS)))
+    pitch = max(pitch, float(np.sqrt(np.prod(high - low) / FILLING.most_cells)))
     width, height = np.ceil((high - low) / pitch).astype(int).clip(1).tolist()
     return basis, pitch, low, (height, width)
 
@@ -262,7 +245,7 @@ def _common(weights: Float[np.ndarray, "n K"], known: Bool[np.ndarray, " n"]) ->
         return np.ones_like(known)
     groups = weights.argmax(1)
     counts = np.bincount(groups[known], minlength=weights.shape[1])
-    return (counts >= _RARE * counts.max())[groups]
+    return (counts >= FILLING.rare * counts.max())[groups]
 
 
 def _covered(points: Float[np.ndarray, "n 3"], views: Sequence[_View]) -> Bool[np.ndarray, " n"]:
@@ -271,7 +254,7 @@ def _covered(points: Float[np.ndarray, "n 3"], views: Sequence[_View]) -> Bool[n
     for view in views:
         inside, rows, columns, z = view.pixels(points)
         depth = np.where(view.hole[rows, columns], 0.0, view.depths[rows, columns])
-        found |= inside & (depth > 0) & (abs(depth - z) <= 2 * _FAR * z)
+        found |= inside & (depth > 0) & (abs(depth - z) <= 2 * FILLING.far * z)
     return found
 
 
@@ -294,7 +277,7 @@ def _seen(
         inside, rows, columns, z = view.pixels(points)
         depth = view.depths[rows, columns]
         open_there = inside & ~view.hole[rows, columns] & (depth > 0)
-        through |= open_there & (depth > _THROUGH * z)
+        through |= open_there & (depth > FILLING.through * z)
         new = open_there & (abs(depth - z) <= on_it * z) & ~known
         colours[new] = view.colours[rows[new], columns[new]]
         if weights is not None and view.weights is not None:
@@ -305,13 +288,13 @@ def _seen(
 
 def _bent(view: _View, missing: Bool[np.ndarray, "H W"], sofar: Scene, render: Render, none: Scene) -> Scene:
     """Pixels that no plane lies around, on a surface that runs smoothly from their edge to their edge."""
-    if missing.sum() < _LEAST:
+    if missing.sum() < FILLING.least:
         return none
     frame = render(sofar, view.camera, weight_maps=False)
     alphas, depths = frame.alphas.cpu().numpy(), frame.depths.cpu().double().numpy()
     missing = missing & (alphas < 0.5)
     known = (alphas >= 0.9) & (depths > 0) & ~missing
-    if missing.sum() < _LEAST or not known.any():
+    if missing.sum() < FILLING.least or not known.any():
         return none
     straight = (frame.rgb.cpu().numpy() / np.maximum(alphas, 1 / 255)[..., None]).clip(0, _BRIGHTEST)
     inverse = np.repeat((1 / np.maximum(depths, 1e-9))[..., None], 3, -1)
@@ -325,7 +308,8 @@ def _bent(view: _View, missing: Bool[np.ndarray, "H W"], sofar: Scene, render: R
     carried = None if view.weights is None else view.weights[nearest[0][missing], nearest[1][missing]]
     return _elements(
         none, transform(pose, points[rows]).numpy(), (pose[:3, :3] @ axes[rows]).numpy(),
-        _COVER * sizes[rows].clamp_min(1e-6).numpy(), spread(straight, known)[missing], carried, view.number,
+        FILLING.cover * sizes[rows].clamp_min(1e-6).numpy(), spread(straight, known)[missing],
+        carried, view.number,
     )  # fmt: skip
 
 
@@ -341,12 +325,12 @@ def _elements(
     """Flat Gaussians with weights over the atoms of `none`, an empty scene of them. They are made by a view;
     in a scene of layers by none, so that every layer has them."""
     count, semantics = len(means), none.semantics
-    thin = _THIN * sizes.min(1, keepdims=True)
+    thin = FILLING.thin * sizes.min(1, keepdims=True)
     gaussians = Gaussians(
         means=torch.from_numpy(means).float(),
         quats=matrices_to_quats(torch.from_numpy(np.array(axes))).float(),
         scales=torch.from_numpy(np.concatenate((sizes, thin), 1)).float(),
-        opacities=torch.full((count,), OPACITY),
+        opacities=torch.full((count,), FILLING.opacity),
         sh=colour_to_sh(torch.from_numpy(colours))[:, None].float(),
     )
     most = semantics.weight_ids.shape[1]

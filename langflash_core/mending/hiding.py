@@ -21,6 +21,7 @@ import torch
 from torch import Tensor
 
 from langflash_core.errors import InputError
+from langflash_core.mending.settings import HIDING, RECIPE_DEFAULTS
 from langflash_core.rig.projected import project_points
 from langflash_core.scene.instances import instances
 from langflash_core.scene.joining import appended
@@ -31,13 +32,8 @@ from .coarse import coarsened
 from .filling import fill
 from .looks import Progress, Render, mattes
 from .photos import grown, not_in_scene, painted_over, reaches, with_photos, without_photos
-from .recipes import MARGIN, MOST_MARGIN
 
 How = Literal["blur", "pixels", "remove"]
-BLOCKS, MOST_BLOCKS = 6.0, 16.0
-_MATTE = 0.02  # of a pixel's light: a photo shows the part from there on
-_BESIDE = 1.03  # times as deep as what a view shows: still that surface
-_OWN = 0.5  # of an atom's opacity in what is hidden: a name of it may say who that was
 
 
 @dataclass(frozen=True)
@@ -50,16 +46,18 @@ class Hiding:
     """
 
     how: How = "blur"
-    blocks: float = BLOCKS
-    margin: float = MARGIN
+    blocks: float = HIDING.blocks
+    margin: float = RECIPE_DEFAULTS.margin
     photos: bool = True
     filled: bool = True
 
     def __post_init__(self) -> None:
-        if not 1 <= self.blocks <= MOST_BLOCKS:
-            raise InputError(f"{self.blocks:g} blocks do not hide it; choose 1 to {MOST_BLOCKS:g}")
-        if not 0 <= self.margin <= MOST_MARGIN:
-            raise InputError(f"a margin of {self.margin:g} is out of range; choose 0 to {MOST_MARGIN:g}")
+        if not 1 <= self.blocks <= HIDING.most_blocks:
+            raise InputError(f"{self.blocks:g} blocks do not hide it; choose 1 to {HIDING.most_blocks:g}")
+        if not 0 <= self.margin <= RECIPE_DEFAULTS.most_margin:
+            raise InputError(
+                f"a margin of {self.margin:g} is out of range; choose 0 to {RECIPE_DEFAULTS.most_margin:g}"
+            )
 
 
 @dataclass(frozen=True)
@@ -129,7 +127,7 @@ def hide(
     return sparser(done), report
 
 
-def preview(scene: Scene, members: Tensor, render: Render, margin: float = MARGIN) -> Tensor:
+def preview(scene: Scene, members: Tensor, render: Render, margin: float = RECIPE_DEFAULTS.margin) -> Tensor:
     """(N,) bool: all Gaussians that `hide` would change."""
     return least_margins(scene, members, render) <= margin
 
@@ -151,7 +149,7 @@ def _reached(scene: Scene, members: Tensor, render: Render) -> tuple[list[np.nda
     means, margins = scene.gaussians.means.cpu(), []
     least = torch.where(members, 0.0, torch.inf)
     for camera, (matte, depths) in zip(cameras, mattes(scene, members, cameras, render), strict=True):
-        margins.append(reaches((matte >= _MATTE).numpy()))
+        margins.append(reaches((matte >= HIDING.matte).numpy()))
         inside, pixels, near = _lying_in(means, camera, depths)
         own = torch.zeros_like(near) if scene.view_ids is None else scene.view_ids.cpu() == len(margins) - 1
         told = torch.from_numpy(margins[-1]).flatten()[pixels]
@@ -164,7 +162,7 @@ def _lying_in(means: Tensor, camera: Camera, depths: Tensor) -> tuple[Tensor, Te
     are no farther than what it shows there, depths (H, W)."""
     there = project_points(means.T, camera.viewmat.cpu(), camera.K.cpu(), (depths.shape[0], depths.shape[1]))
     shown = there.looked_up(depths.flatten())
-    return there.inside, there.pixels, (shown * _BESIDE >= there.z) | (shown <= 0)
+    return there.inside, there.pixels, (shown * HIDING.beside >= there.z) | (shown <= 0)
 
 
 def _block_side(scene: Scene, members: Tensor, blocks: float) -> float:
@@ -188,7 +186,7 @@ def _unnamed(scene: Scene, rows: Tensor) -> tuple[Scene, tuple[str, ...]]:
     sums = torch.zeros(2, semantics.num_atoms + 1)
     for place, some in enumerate((rows, torch.ones_like(rows))):
         sums[place].index_add_(0, semantics.weight_ids[some].flatten(), shares[some].flatten().float())
-    gone = {k for k in told if float(sums[0, k]) >= _OWN * float(sums[1, k])}
+    gone = {k for k in told if float(sums[0, k]) >= HIDING.own * float(sums[1, k])}
     names = (
         *(record.atom_names[k] for k in sorted(gone) if k in record.atom_names),
         *record.thing_names.values(),

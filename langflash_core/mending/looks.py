@@ -13,6 +13,7 @@ import torch
 from torch import Tensor
 
 from langflash_core.geometry.harmonics import colour_to_sh
+from langflash_core.mending.settings import PREVIEW
 from langflash_core.scene.exposure import lit_camera
 from langflash_core.scene.gaps import filled
 from langflash_core.splat import drawable_rows, project, view_colours, view_depths
@@ -21,9 +22,6 @@ from langflash_core.splat.tiles import rasterize_tiles
 from langflash_core.types import Camera, Frame, Record, Scene, Semantics
 
 Render = Callable[..., Frame]  # (scene, camera, weight_maps=True)
-_SHADE, _RED = (0.85, 0.1, 0.1), 0.75  # of a preview
-_LEAST = 1 / 255  # of a pixel that is covered
-_MOST_VIEWS = 4  # in a picture of before and after
 Progress = Callable[[str, float], None]
 
 
@@ -44,8 +42,8 @@ def _drawn(scene: Scene, camera: Camera, weight_maps: bool) -> Frame:
     if weight_maps:
         features.append(scene.semantics.dense_weights()[rows].float())
     maps, alphas = rasterize_tiles(project(gaussians, camera), features, camera)
-    covered = alphas >= _LEAST
-    depths = torch.where(covered, maps[0][..., 3] / alphas.clamp_min(_LEAST), 0.0)
+    covered = alphas >= PREVIEW.least
+    depths = torch.where(covered, maps[0][..., 3] / alphas.clamp_min(PREVIEW.least), 0.0)
     return Frame(maps[0][..., :3], alphas, depths, maps[1] if weight_maps else None)
 
 
@@ -71,8 +69,8 @@ def mattes(
 def reddened(scene: Scene, rows: Tensor) -> Scene:
     """The scene with some Gaussians (N,) bool in red, still light and dark."""
     sh = scene.gaussians.sh.clone()
-    sh[rows] *= 1 - _RED
-    sh[rows, 0] += _RED * colour_to_sh(torch.tensor(_SHADE)).to(sh)
+    sh[rows] *= 1 - PREVIEW.red
+    sh[rows, 0] += PREVIEW.red * colour_to_sh(torch.tensor(PREVIEW.shade)).to(sh)
     return replace(scene, gaussians=replace(scene.gaussians, sh=sh))
 
 
@@ -85,7 +83,7 @@ def before_and_after(scene: Scene, rows: Tensor, after: Scene | None, render: Re
             continue
         frames = [
             render(each, lit_camera(each, each.camera(view)), weight_maps=False)
-            for view in range(min(scene.num_views, _MOST_VIEWS))
+            for view in range(min(scene.num_views, PREVIEW.most_views))
         ]
         columns.append(torch.cat([filled(frame.rgb.cpu(), frame.alphas.cpu()) for frame in frames]))
     return torch.cat(columns, 1).clamp(0, 1)

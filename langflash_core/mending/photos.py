@@ -17,16 +17,12 @@ from PIL import Image
 
 from langflash_core.base.picture_files import STORED, opened_picture
 from langflash_core.errors import SceneFileError
+from langflash_core.mending.settings import HIDDEN_PHOTOS
 from langflash_core.scene.exposure import lit_camera
 from langflash_core.scene.gaps import filled
 from langflash_core.types import Camera, Scene
 
 from .looks import Render
-
-QUALITY = 90  # of JPEG
-_PATCH, _STRANGE = 5, 0.12  # pixels; mean difference of a photo from the scene over so many
-_LEAST = 2.0  # pixels around a mask that always belong to it
-_ROUNDED = 0.2  # of a blurred mask: it grows a little, and loses the corners of its pixels
 
 
 def grown(mask: Bool[np.ndarray, "H W"], margin: float) -> Bool[np.ndarray, "H W"]:
@@ -40,7 +36,7 @@ def reaches(mask: Bool[np.ndarray, "H W"]) -> Float[np.ndarray, "H W"]:
     if not mask.any():
         return np.full(mask.shape, np.inf, np.float32)
     far = cv2.distanceTransform((~mask).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
-    return np.where(far <= _LEAST, 0.0, far / max(mask.shape)).astype(np.float32)
+    return np.where(far <= HIDDEN_PHOTOS.least, 0.0, far / max(mask.shape)).astype(np.float32)
 
 
 def painted_over(scene: Scene, view: int, mask: Bool[np.ndarray, "H W"], render: Render) -> bytes:
@@ -55,11 +51,14 @@ def painted_over(scene: Scene, view: int, mask: Bool[np.ndarray, "H W"], render:
     photo = _decoded(scene.photos[view], view)
     height, width = photo.shape[:2]
     covered = cv2.resize(mask.astype(np.float32), (width, height), interpolation=cv2.INTER_LINEAR)
-    covered = cv2.GaussianBlur((covered > 0).astype(np.float32), (0, 0), width / mask.shape[1]) > _ROUNDED
+    covered = (
+        cv2.GaussianBlur((covered > 0).astype(np.float32), (0, 0), width / mask.shape[1])
+        > HIDDEN_PHOTOS.rounded
+    )
     shown = _shown(scene, scene.camera(view, width, height), render)
     painted = np.where(covered[..., None], shown, photo)
     stream = io.BytesIO()
-    Image.fromarray(painted).save(stream, "JPEG", quality=QUALITY)
+    Image.fromarray(painted).save(stream, "JPEG", quality=HIDDEN_PHOTOS.quality)
     return stream.getvalue()
 
 
@@ -73,7 +72,7 @@ def not_in_scene(scene: Scene, view: int, render: Render) -> Bool[np.ndarray, "H
     photo = cv2.resize(_decoded(scene.photos[view], view), (width, height), interpolation=cv2.INTER_AREA)
     shown = _shown(scene, scene.camera(view), render)
     apart = abs(photo.astype(np.float32) - shown.astype(np.float32)).mean(-1) / 255
-    return cv2.blur(apart, (_PATCH, _PATCH)) > _STRANGE
+    return cv2.blur(apart, (HIDDEN_PHOTOS.patch, HIDDEN_PHOTOS.patch)) > HIDDEN_PHOTOS.strange
 
 
 def with_photos(scene: Scene, photos: dict[int, bytes]) -> Scene:

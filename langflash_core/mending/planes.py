@@ -9,8 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Bool, Float
 
-_TRIPLES = 500
-_REFITS = 3
+from langflash_core.mending.settings import PLANE_FIT
 
 
 @dataclass(frozen=True)
@@ -61,7 +60,7 @@ def _best(
     points: Float[np.ndarray, "n 3"], tolerances: Float[np.ndarray, " n"], draws: np.random.Generator
 ) -> Plane | None:
     """None where all triples lie in a line."""
-    triples = points[draws.integers(len(points), size=(_TRIPLES, 3))]  # (t, 3, 3)
+    triples = points[draws.integers(len(points), size=(PLANE_FIT.triples, 3))]  # (t, 3, 3)
     normals = np.cross(triples[:, 1] - triples[:, 0], triples[:, 2] - triples[:, 0])
     lengths = np.linalg.norm(normals, axis=1, keepdims=True)
     normals /= np.maximum(lengths, 1e-30)
@@ -71,7 +70,7 @@ def _best(
     if not inliers.any():
         return None
     plane = _through(points[inliers])
-    for _ in range(_REFITS):
+    for _ in range(PLANE_FIT.refits):
         inliers = abs(plane.apart(points)) <= tolerances
         if inliers.sum() < 3:
             break

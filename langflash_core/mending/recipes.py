@@ -20,23 +20,20 @@ from typing import Any
 from langflash_core.base.files import write_atomically
 from langflash_core.base.limits import TEXT
 from langflash_core.errors import InputError
+from langflash_core.mending.settings import RECIPE_DEFAULTS
 
 FORMAT, VERSION = "langflash-recipe", 1
 HOWS = ("blur", "pixels", "remove")
 """How a part can be hidden (`hiding.py`)."""
-MARGIN, MOST_MARGIN = 0.02, 0.25
-"""Around a part that is hidden, in photos, of their longer side: the usual one, and the widest."""
 KINDS = ("floaters", "sheets", "flyaways", "crumbs")
 MEASURES = ("confidence", "size", "opacity", "depth", "photos")
 """What a rule may bound: sureness of depth in [0, 1]; radius, scene units; opacity in [0, 1]; distance from
 the nearest photo's place, scene units; how many photos see it."""
 COLOUR = "colour"  # red, green, blue in [0, 1], and how far a channel may be off
 PRESETS = ("core", "room")
-STRENGTH = 0.5
 _KEYS = ("format", "version", "strength", "kinds", "rules", "within", "invert", "crop")
 _BOUND = re.compile(r"([a-z]+)\s*([<>])\s*(\S+)")
 _SHADE = re.compile(r"colour\s*~\s*#([0-9a-fA-F]{6})(?::(\S+))?")
-_OFF = 0.1  # of a colour, where nothing is said
 
 Rule = Mapping[str, tuple[float | None, ...]]
 """Conditions by name: a low and a high bound, each may be missing; of a colour its three parts, and how far
@@ -98,7 +95,7 @@ def parsed_rule(text: str) -> Rule:
         bound, shade = _BOUND.fullmatch(part.strip()), _SHADE.fullmatch(part.strip())
         if shade:
             red, green, blue = (int(shade[1][at : at + 2], 16) / 255 for at in (0, 2, 4))
-            rule[COLOUR] = (red, green, blue, _number(shade[2] or str(_OFF)))
+            rule[COLOUR] = (red, green, blue, _number(shade[2] or str(RECIPE_DEFAULTS.off)))
         elif bound:
             low, high = rule.get(bound[1], (None, None))
             limit = _number(bound[3])

@@ -24,8 +24,10 @@ from scipy.spatial import KDTree
 from langflash_core.errors import InputError
 from langflash_core.geometry.cameras import invert_rigid
 from langflash_core.geometry.quaternions import quats_to_matrices
-from langflash_core.scene.instances import LINK, connected
+from langflash_core.mending.settings import CRUMBS
+from langflash_core.scene.instances import connected
 from langflash_core.scene.selection import isolation
+from langflash_core.scene.settings import INSTANCES
 from langflash_core.scene.thin import covered_areas
 from langflash_core.types import Scene
 
@@ -34,8 +36,6 @@ from .recipes import KINDS
 LIMITS = {"floaters": (14.0, 2.5), "crumbs": (6.0, 3.0), "sheets": (80.0, 15.0), "flyaways": (12.0, 4.0)}
 """l_0 and l_1 of each kind, chosen on rendered rooms (MEASURED.md, "Floaters that were planted")."""
 NEVER = np.inf
-_APART = 3.0  # times LINK: what is nearer to the rest is no crumb, but a part of its surface
-_FEWEST = 16  # Gaussians of which it can be said what is usual
 
 
 def least_strengths(
@@ -65,7 +65,7 @@ def kind_strengths(
     if scene.layered and bool((views >= 0).any()):
         return _of_layers(scene, visible, kinds, [int(view) for view in views if view >= 0])
     found, left = {}, visible.copy()
-    for kind in (kind for kind in KINDS if kind in kinds and visible.sum() >= _FEWEST):
+    for kind in (kind for kind in KINDS if kind in kinds and visible.sum() >= CRUMBS.fewest):
         least = _least(_SCORES[kind](scene, left), *LIMITS[kind])
         found[kind] = np.where(left, least, NEVER).astype(np.float32)
         left &= found[kind] == NEVER  # sheets would connect crumbs with what they are no part of
@@ -114,7 +114,7 @@ def _crumbs(scene: Scene, visible: Bool[np.ndarray, " N"]) -> Float[np.ndarray, 
         return scores
     means = scene.gaussians.means.detach().cpu().double().numpy()
     distance, which = KDTree(means[rest]).query(means[small])
-    reach = _APART * LINK * (radii[small] + radii[rest][which]) / 2
+    reach = CRUMBS.apart * INSTANCES.link * (radii[small] + radii[rest][which]) / 2
     nearest = np.full(len(surfaces), np.inf)
     np.minimum.at(nearest, parts[small], distance / reach)  # the nearest of a part speaks for all of it
     shares = surfaces[parts[small]] / surfaces.sum()

@@ -15,11 +15,8 @@ import torch
 from jaxtyping import Bool, Float
 from scipy import ndimage
 
+from langflash_core.mending.settings import TEXTURE
 from langflash_core.scene.gaps import filled
-
-_BAND = 4  # pixels around the hole that a shift has to fit
-_STEPS = 24  # shifts tried along each axis, to either side
-_KNOWN = 0.97  # share of the hole and its band that must be known where they are shifted to
 
 
 def healed(
@@ -61,7 +58,7 @@ def spread(values: Float[np.ndarray, "H W n"], known: Bool[np.ndarray, "H W"]) -
 
 
 def _around(hole: Bool[np.ndarray, "H W"]) -> Bool[np.ndarray, "H W"]:
-    size = 2 * _BAND + 1
+    size = 2 * TEXTURE.band + 1
     wider = cv2.dilate(hole.astype(np.uint8), np.ones((size, size), np.uint8)) > 0
     return wider & ~hole
 
@@ -76,15 +73,15 @@ def _best_shift(
         return None
     best, cost = None, np.inf
     height, width = hole.shape
-    for down in np.unique(np.linspace(-height, height, 2 * _STEPS + 1).astype(int)):
-        for right in np.unique(np.linspace(-width, width, 2 * _STEPS + 1).astype(int)):
+    for down in np.unique(np.linspace(-height, height, 2 * TEXTURE.steps + 1).astype(int)):
+        for right in np.unique(np.linspace(-width, width, 2 * TEXTURE.steps + 1).astype(int)):
             y, x = rows - down, columns - right
             inside = (y >= 0) & (y < height) & (x >= 0) & (x < width)
-            if inside.mean() < _KNOWN:
+            if inside.mean() < TEXTURE.known:
                 continue
             there = inside.copy()
             there[inside] = known[y[inside], x[inside]]
-            if there.mean() < _KNOWN:
+            if there.mean() < TEXTURE.known:
                 continue
             fit = there & band
             apart = colours[rows[fit], columns[fit]] - colours[y[fit], x[fit]]

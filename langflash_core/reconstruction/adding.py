@@ -23,8 +23,8 @@ from langflash_core.errors import InputError
 from langflash_core.geometry.cameras import fov_degrees
 from langflash_core.geometry.pinhole import from_pixels
 from langflash_core.images.decode import PhotoFacts, read_photo
-from langflash_core.images.lens import ASSUMED_FOV, exif_fov
-from langflash_core.images.pictures import MAX_PHOTOS
+from langflash_core.images.lens import exif_fov
+from langflash_core.images.settings import LENS_PRIOR, PHOTO_LIMITS
 from langflash_core.images.straight import straightened
 from langflash_core.images.views import load_views
 from langflash_core.rig.settings import ADDING, MATCHING, PAIRING
@@ -87,7 +87,7 @@ def _lens(scene: Scene, photo: PhotoFacts) -> FoundLens | None:
     nothing."""
     said = exif_fov(photo)
     for known in scene.record.lens.get("found", ()):
-        if abs(known["said"] - (ASSUMED_FOV if said is None else said)) < ADDING.same_lens:
+        if abs(known["said"] - (LENS_PRIOR.assumed_fov if said is None else said)) < ADDING.same_lens:
             return FoundLens(**known)
     return None if said is None else FoundLens(said, 0.0, 1, said, True)
 
@@ -112,9 +112,9 @@ def _check(scene: Scene, count: int) -> None:
         raise InputError(
             "this scene keeps no layer and picture of each photo; reconstruct it again with all photos"
         )
-    if scene.num_views + count > MAX_PHOTOS:
+    if scene.num_views + count > PHOTO_LIMITS.max_photos:
         raise InputError(
-            f"{scene.num_views + count} photos are too many; a scene has at most {MAX_PHOTOS} of them"
+            f"{scene.num_views + count} photos are too many; a scene has at most {PHOTO_LIMITS.max_photos} of them"
         )
 
 

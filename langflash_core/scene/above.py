@@ -15,14 +15,8 @@ from scipy.ndimage import gaussian_filter
 
 from langflash_core.geometry import rotations
 from langflash_core.geometry.harmonics import sh_to_colour
+from langflash_core.scene.settings import FROM_ABOVE
 from langflash_core.types import Gaussians, Scene
-
-_CORE = (0.01, 0.99)  # of the Gaussians along an axis: stray ones do not stretch the picture
-_MARGIN = 0.06  # around all places, of the longer side
-_LEAST = 0.5  # shorter side of the picture, of the longer one
-_GROUND = 26  # of 255, where nothing stands
-_BLUR = 0.9  # cells: closes the gaps between Gaussians
-_FULL = 0.02  # of what the fullest hundredth of cells hold: shown as it is; less fades into the ground
 
 
 @dataclass(frozen=True)
@@ -60,10 +54,10 @@ def seen_from_above(scene: Scene) -> Above:
     eyes = (centres @ axes.T)[:, [0, 2]]
     ends = [eyes.min(0), eyes.max(0)]
     if len(points):
-        ends += list(np.percentile(points, [100 * share for share in _CORE], axis=0))
+        ends += list(np.percentile(points, [100 * share for share in FROM_ABOVE.core], axis=0))
     low, high = np.min(ends, axis=0), np.max(ends, axis=0)
     longest = max(float((high - low).max()), 1e-6)
-    size = np.maximum(high - low, _LEAST * longest) + 2 * _MARGIN * longest
+    size = np.maximum(high - low, FROM_ABOVE.least * longest) + 2 * FROM_ABOVE.margin * longest
     middle = (low + high) / 2
     corner = (float(middle[0] - size[0] / 2), float(middle[1] + size[1] / 2))
     looks = (viewmats[:, 2, :3] @ axes.T)[:, [0, 2]] * (1, -1)
@@ -91,11 +85,15 @@ def drawn_from_above(scene: Scene, above: Above, side: int = 256) -> UInt8[np.nd
     )
     columns = (*(weights[:, None] * colours).T, weights)
     sums = (np.bincount(cells, column, width * height).reshape(height, width) for column in columns)
-    *light, mass = (gaussian_filter(each, _BLUR) for each in sums)
-    full = _FULL * np.quantile(mass, 0.99)
+    *light, mass = (gaussian_filter(each, FROM_ABOVE.blur) for each in sums)
+    full = FROM_ABOVE.full * np.quantile(mass, 0.99)
     share = np.minimum(mass / full, 1.0) if full > 0 else np.zeros_like(mass)
     rgb = np.stack(light, axis=-1) / np.maximum(mass, 1e-30)[..., None] * 255
-    return np.round(_GROUND + share[..., None] * (rgb - _GROUND)).clip(0, 255).astype(np.uint8)
+    return (
+        np.round(FROM_ABOVE.ground + share[..., None] * (rgb - FROM_ABOVE.ground))
+        .clip(0, 255)
+        .astype(np.uint8)
+    )
 
 
 def _areas_and_colours(

@@ -12,12 +12,9 @@ from torch.nn.functional import normalize
 from langflash_core.base.picture_files import STORED, opened_picture
 from langflash_core.rig.projected import project_points
 from langflash_core.scene.selection import strongest_atoms
+from langflash_core.scene.settings import ATOM_PICTURES
 from langflash_core.scene.thin import covered_areas
 from langflash_core.types import Scene
-
-CELL = 4  # pixels of a photo as the network saw it, along a side
-PICTURE_SIDE = 96
-NEAR_ENOUGH = 1.05  # of the nearest depth in a cell: what lies behind is hidden
 
 
 @dataclass(frozen=True)
@@ -102,14 +99,17 @@ def atom_pictures(scene: Scene) -> tuple[UInt8[np.ndarray, "_ _ 3"] | None, ...]
 def atom_cells(scene: Scene, view: int) -> Float[np.ndarray, "K h w"]:
     """(K, h, w): how much of each atom the cells of a photo show, of what is not hidden there."""
     camera = scene.camera(view)
-    width, height = -(-camera.width // CELL), -(-camera.height // CELL)
-    points, K = scene.gaussians.means.double().T, camera.K.double() / torch.tensor([[CELL], [CELL], [1]])
+    width, height = -(-camera.width // ATOM_PICTURES.cell), -(-camera.height // ATOM_PICTURES.cell)
+    points, K = (
+        scene.gaussians.means.double().T,
+        camera.K.double() / torch.tensor([[ATOM_PICTURES.cell], [ATOM_PICTURES.cell], [1]]),
+    )
     there = project_points(points, camera.viewmat.double(), K, (height, width))
     rows, z = np.flatnonzero(there.inside.numpy()), there.z.numpy()
     cells = there.pixels.numpy()[rows]
     nearest = np.full(width * height, np.inf)
     np.minimum.at(nearest, cells, z[rows])
-    seen = z[rows] <= NEAR_ENOUGH * nearest[cells]
+    seen = z[rows] <= ATOM_PICTURES.near_enough * nearest[cells]
     rows, cells = rows[seen], cells[seen]
     semantics = scene.semantics
     ids = semantics.weight_ids.numpy()[rows]
@@ -131,7 +131,7 @@ def _crop(photo: np.ndarray, cells: np.ndarray) -> np.ndarray:
     left = float(np.clip(column + 0.5 - side / 2, 0, width - side))
     down, right = photo.shape[0] / height, photo.shape[1] / width
     box = (left * right, top * down, (left + side) * right, (top + side) * down)
-    size = (PICTURE_SIDE, PICTURE_SIDE)
+    size = (ATOM_PICTURES.picture_side, ATOM_PICTURES.picture_side)
     return np.asarray(Image.fromarray(photo).resize(size, Image.Resampling.BILINEAR, box))
 
 

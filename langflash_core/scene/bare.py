@@ -15,20 +15,8 @@ from torch import Tensor
 
 from langflash_core.geometry.cameras import intrinsics_from_fov
 from langflash_core.geometry.pinhole import from_pixels
+from langflash_core.scene.settings import BARE_VIEWS
 from langflash_core.types import NO_LANGUAGE, Camera, Gaussians, Record, Scene, Semantics
-
-VIEW_SIZE = (960, 720)  # pixels
-_FOV = 50.0  # degrees of the longer side, from outside
-_ELEVATION = math.radians(15)  # floors and table tops show
-_MOST = 200_000  # Gaussians looked at: medians need no more
-_SEEN = 0.1  # opacity from which a Gaussian says where the scene is
-_CONE = math.tan(math.radians(50))  # wider than the field of view of photos
-_IN_CONE = 0.98  # share of the Gaussians; the rest bled in depth
-_SHOWN = 0.97  # share of the slopes that the view from the origin shows
-# An even spread ends 2 median deviations from its middle, a normal one fades at 4.
-_DEVIATIONS = 2.5
-_MARGIN = 1.2
-_FARTHEST = 1e38  # float32 ends at 3.4e38, and a hostile file has means there
 
 
 def bare_scene(gaussians: Gaussians, source: str, warnings: tuple[str, ...] = ()) -> Scene:
@@ -50,13 +38,13 @@ def bare_scene(gaussians: Gaussians, source: str, warnings: tuple[str, ...] = ()
         semantics,
         viewmats=camera.viewmat[None],
         Ks=camera.K[None],
-        view_size=VIEW_SIZE,
+        view_size=BARE_VIEWS.view_size,
         record=Record(source=source, warnings=warnings),
     )
 
 
 def framing_camera(gaussians: Gaussians) -> Camera:
-    """A camera of `VIEW_SIZE` that shows most of the Gaussians, N >= 1."""
+    """A camera of `BARE_VIEWS.view_size` that shows most of the Gaussians, N >= 1."""
     rows = seen_rows(gaussians)
     means = gaussians.means[rows].double().cpu()
     widths = gaussians.scales[rows].double().cpu().amax(-1)
@@ -64,16 +52,16 @@ def framing_camera(gaussians: Gaussians) -> Camera:
 
 
 def seen_rows(gaussians: Gaussians) -> Integer[Tensor, " n"]:
-    """Numbers of some Gaussians that one sees, at most `_MOST`, evenly chosen; n >= 1."""
-    rows = torch.arange(0, len(gaussians), max(1, len(gaussians) // _MOST))
-    seen = (gaussians.opacities[rows] >= _SEEN).cpu()
+    """Numbers of some Gaussians that one sees, at most `BARE_VIEWS.most`, evenly chosen; n >= 1."""
+    rows = torch.arange(0, len(gaussians), max(1, len(gaussians) // BARE_VIEWS.most))
+    seen = (gaussians.opacities[rows] >= BARE_VIEWS.seen).cpu()
     return rows[seen] if bool(seen.any()) else rows
 
 
 def middle_box(means: Float[Tensor, "n 3"]) -> tuple[Float[Tensor, " 3"], Float[Tensor, " 3"]]:
     """Two corners of what lies around the median: floaters and far backgrounds are outside."""
     middle = means.quantile(0.5, dim=0)
-    reach = _DEVIATIONS * (means - middle).abs().quantile(0.5, dim=0)
+    reach = BARE_VIEWS.deviations * (means - middle).abs().quantile(0.5, dim=0)
     ordered = means.sort(dim=0).values
     low = torch.maximum(middle - reach, ordered[round(0.01 * (len(means) - 1))])
     return low, torch.minimum(middle + reach, ordered[round(0.99 * (len(means) - 1))])
@@ -85,8 +73,8 @@ def _from_origin(means: Tensor) -> Camera | None:
         return None
     ahead = means[:, 2] > 0
     slopes = means[:, :2].abs() / means[:, 2:].clamp_min(1e-12)  # (n, 2)
-    width, height = VIEW_SIZE
-    across, down = (_at_share(slope[ahead], _SHOWN) for slope in slopes.unbind(-1))
+    width, height = BARE_VIEWS.view_size
+    across, down = (_at_share(slope[ahead], BARE_VIEWS.shown) for slope in slopes.unbind(-1))
     widest = max(across, down * width / height, math.tan(math.radians(15)))
     fov = 2 * math.degrees(math.atan(widest))
     return Camera(torch.eye(4), intrinsics_from_fov(fov, width, height), width, height)
@@ -95,27 +83,27 @@ def _from_origin(means: Tensor) -> Camera | None:
 def in_one_cone(means: Tensor) -> bool:
     """Whether nearly all of means (n, 3) lie ahead of the origin, along +z, as what photos there predict."""
     slopes = means[:, :2].abs() / means[:, 2:].clamp_min(1e-12)
-    inside = (means[:, 2] > 0) & (slopes < _CONE).all(-1)
-    return float(inside.double().mean()) >= _IN_CONE
+    inside = (means[:, 2] > 0) & (slopes < BARE_VIEWS.cone).all(-1)
+    return float(inside.double().mean()) >= BARE_VIEWS.in_cone
 
 
 def _from_outside(means: Tensor, width: float) -> Camera:
     """Ahead of the middle box of means (n, 3), which is never thinner than their median `width`."""
     low, high = middle_box(means)
     centre = (low + high) / 2
-    half = _MARGIN * ((high - low) / 2).clamp_min(3 * width)
-    sine, cosine = math.sin(_ELEVATION), math.cos(_ELEVATION)
+    half = BARE_VIEWS.margin * ((high - low) / 2).clamp_min(3 * width)
+    sine, cosine = math.sin(BARE_VIEWS.elevation), math.cos(BARE_VIEWS.elevation)
     axes = torch.tensor([[1.0, 0, 0], [0, cosine, -sine], [0, sine, cosine]], dtype=torch.float64)
     signs = torch.cartesian_prod(*[torch.tensor([-1.0, 1.0], dtype=torch.float64)] * 3)
     corners = (signs * half) @ axes.T  # (8, 3), camera axes, around the centre
-    K = intrinsics_from_fov(_FOV, *VIEW_SIZE)
-    tangents = from_pixels(torch.tensor(VIEW_SIZE), K)
+    K = intrinsics_from_fov(BARE_VIEWS.fov, *BARE_VIEWS.view_size)
+    tangents = from_pixels(torch.tensor(BARE_VIEWS.view_size), K)
     distance = float((corners[:, :2].abs() / tangents - corners[:, 2:]).max())
     viewmat = torch.eye(4)
     viewmat[:3, :3] = axes
     place = torch.tensor([0, 0, distance], dtype=torch.float64) - axes @ centre
-    viewmat[:3, 3] = place.clamp(-_FARTHEST, _FARTHEST)
-    return Camera(viewmat, K, *VIEW_SIZE)
+    viewmat[:3, 3] = place.clamp(-BARE_VIEWS.farthest, BARE_VIEWS.farthest)
+    return Camera(viewmat, K, *BARE_VIEWS.view_size)
 
 
 def _at_share(values: Tensor, share: float) -> float:

@@ -13,6 +13,7 @@ import numpy as np
 from jaxtyping import Float
 
 from langflash_core.scene.mask import Mask
+from langflash_core.scene.settings import CHANGES
 
 if TYPE_CHECKING:
     from scipy.spatial.transform import Rotation
@@ -21,8 +22,6 @@ Spot = tuple[float, float, float]
 Turn = tuple[float, float, float, float]  # unit quaternion wxyz
 UNTURNED: Turn = (1.0, 0.0, 0.0, 0.0)
 LUMA = (0.299, 0.587, 0.114)  # as in types.py, which imports torch
-DARKEST = 0.05  # mean luma of what is recoloured, at the least: black has no shading to keep
-SCALES = (1e-3, 1e3)  # of one change
 
 
 @dataclass(frozen=True)
@@ -72,7 +71,7 @@ class Recoloured:
         Args:
             colour: of the tint, in [0, 1]. strength: s in [0, 1]. luma: m, the mean of what is tinted.
         """
-        shaded = np.outer(colour, LUMA) / max(luma, DARKEST)
+        shaded = np.outer(colour, LUMA) / max(luma, CHANGES.darkest)
         matrix = (1 - strength) * np.eye(3) + strength * shaded
         return Recoloured(rows, tuple(matrix.ravel().tolist()))
 

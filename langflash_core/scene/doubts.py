@@ -10,19 +10,8 @@ from dataclasses import dataclass
 from typing import Any
 
 from langflash_core.base.records import Record
+from langflash_core.scene.settings import DOUBTS
 
-TORN = 0.65
-"""Likeness of a photo's edges to what its neighbours foresee (`foreseen`), below which they do not meet. Of
-25 photos of two real walks it is .46 to .92; all nine below .65 look torn in pictures of their neighbours'
-layers, of the others single near things do. With one pose a degree wrong it is .46 on average, with two .18.
-"""
-ALONE = 0.5
-"""Share of a photo that its neighbours show, below which it stands alone: at both ends of two real walks,
-behind which nobody stood, it is .71 to .80."""
-BLURRED = 26.0
-"""dB of a photo's own layer beside it, below which one sees that they differ: layers of real photos reach 34
-to 40, and 26 is what one surface of nine photos shows between them."""
-_TOLD = 6  # photos, and gaps between photos, that are told one by one
 _REMEDY = "take more photos {}, with more light, and hold still"
 _AGAIN = "take {} again with more light, and hold still"
 
@@ -63,7 +52,7 @@ def doubt_line(record: Record, num_views: int) -> str:
     gaps = list(dict.fromkeys(found.gap(view) for view in sorted((*found.torn, *found.alone))))
     if not gaps:
         return f"{_listed(parts)}; {_AGAIN.format('it' if len(found.blurred) == 1 else 'them')}"
-    where = _listed(gaps) if len(gaps) <= _TOLD else "between them and their neighbours"
+    where = _listed(gaps) if len(gaps) <= DOUBTS.told else "between them and their neighbours"
     return f"{_listed(parts)}; {_REMEDY.format(where)}"
 
 
@@ -79,14 +68,16 @@ class _Found:
     @staticmethod
     def of(record: Record, num_views: int) -> "_Found":
         near = _numbers(record.detail, "photos_psnr_db", num_views)
-        blurred = [view for view, value in enumerate(near) if value is not None and value < BLURRED]
+        blurred = [view for view, value in enumerate(near) if value is not None and value < DOUBTS.blurred]
         columns = [_numbers(record.foreseen, name, num_views) for name in ("covered", "alike", "nearest")]
         rows = list(zip(*columns, strict=True)) if all(columns) else []
         nearest = [beside for _, _, beside in rows if beside in range(num_views)]
         if len(nearest) < num_views:  # nothing is known, or another version means something else
             return _Found(blurred=blurred)
-        alone = [view for view, (shown, _, _) in enumerate(rows) if shown is not None and shown < ALONE]
-        torn = [view for view, (_, like, _) in enumerate(rows) if like is not None and like < TORN]
+        alone = [
+            view for view, (shown, _, _) in enumerate(rows) if shown is not None and shown < DOUBTS.alone
+        ]
+        torn = [view for view, (_, like, _) in enumerate(rows) if like is not None and like < DOUBTS.torn]
         return _Found([view for view in torn if view not in alone], alone, blurred, nearest)
 
     def gap(self, view: int) -> str:
@@ -106,7 +97,7 @@ def _numbers(told: Mapping[str, Any], name: str, count: int) -> list[float | Non
 
 def _photos(views: Sequence[int]) -> str:
     """Counted from 1."""
-    named = [str(view + 1) for view in views[:_TOLD]]
+    named = [str(view + 1) for view in views[: DOUBTS.told]]
     more = len(views) - len(named)
     if more:
         named.append("another one" if more == 1 else f"{more} others")

@@ -23,12 +23,8 @@ from jaxtyping import Float
 
 from langflash_core.geometry import cameras
 from langflash_core.geometry.cameras import invert_rigid
+from langflash_core.scene.settings import EXPOSURE
 from langflash_core.types import Camera, Scene
-
-FAR = 0.25
-"""Radians: so far from the only photo, a picture is half in its light. Beside eight real photos .2 and .3 are
-best in the mean (MEASURED, "The light of a place")."""
-HERE = 1e-4  # radians, within which a place is a photo's own
 
 
 @dataclass(frozen=True)
@@ -65,8 +61,8 @@ class PlaceLight:
         angles = 2 * np.arcsin(np.minimum(chords / 2, 1))
         centre = -viewmat[:3, :3].T @ viewmat[:3, 3]
         ways = np.linalg.norm(self.poses[:, :3, 3] - centre, axis=1) / self.distance
-        weights = 1 / (angles**2 + ways**2 + HERE**2)
-        return weights / (weights.sum() + 1 / FAR**2)
+        weights = 1 / (angles**2 + ways**2 + EXPOSURE.here**2)
+        return weights / (weights.sum() + 1 / EXPOSURE.far**2)
 
 
 def lit_camera(scene: Scene, camera: Camera) -> Camera:

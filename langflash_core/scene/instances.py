@@ -9,22 +9,12 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import KDTree
 
 from langflash_core.rig.projected import project_points
+from langflash_core.scene.settings import INSTANCES
 from langflash_core.types import Gaussians, Scene
-
-LINK = 4.0
-"""Mean radii within which two Gaussians touch. On scenes of photos the parts are the same from 3 to 8; below,
-surfaces fall apart, since neighbours of a pixel's size are 1.5 radii apart."""
-SMALLEST = 0.02  # of the largest thing's surface: less is a crumb
-SAME = 0.1
-"""Of the logarithm of depth, within which two layers show the same: as `DEPTH` of `splat.compose`."""
-_SHOWN = 0.25
-"""Of the smaller of two parts, that a photo shows at the other's place: much of a thing may be hidden there,
-and what stands beside it meets it with its edge."""
-_NEIGHBOURS = 16  # asked of each: more than a surface needs to stay in one piece
 
 
 def instances(
-    gaussians: Gaussians, members: Bool[np.ndarray, " N"], link: float = LINK
+    gaussians: Gaussians, members: Bool[np.ndarray, " N"], link: float = INSTANCES.link
 ) -> Integer[np.ndarray, " N"]:
     """Numbers of connected things among some Gaussians.
 
@@ -37,7 +27,8 @@ def instances(
         members: what takes part.
 
     Returns:
-        From 1, the largest surface (sum of r^2) first; 0 for others, and for crumbs below `SMALLEST` of it.
+        From 1, the largest surface (sum of r^2) first; 0 for others, and for crumbs below
+        `INSTANCES.smallest` of it.
     """
     return _numbered(*connected(gaussians, members, link))
 
@@ -46,8 +37,8 @@ def things(scene: Scene, members: Bool[np.ndarray, " N"]) -> Integer[np.ndarray,
     """`instances` of a scene; of a scene of layers, a thing that several of them show is one, although their
     depths may lie farther apart than what touches.
 
-    Parts a and b are one where the photo of b's layer shows, at the pixels of b and within `SAME` of their
-    depth, at least `_SHOWN` of the smaller one's surface of a.
+    Parts a and b are one where the photo of b's layer shows, at the pixels of b and within `INSTANCES.same`
+    of their depth, at least `INSTANCES.shown` of the smaller one's surface of a.
     """
     return _numbered(*parts_of(scene, members))
 
@@ -55,7 +46,7 @@ def things(scene: Scene, members: Bool[np.ndarray, " N"]) -> Integer[np.ndarray,
 def parts_of(
     scene: Scene, members: Bool[np.ndarray, " N"]
 ) -> tuple[Integer[np.ndarray, " N"], Float[np.ndarray, " N"]]:
-    """`connected` of a scene; of one of layers, what several of them show has one number, as in `things`."""
+    """`connected` of a scene; what several layers show has one number, as in `things`."""
     parts, radii = connected(scene.gaussians, members)
     if scene.layered and parts.max(initial=-1) > 0:
         parts = _as_one(scene, parts, radii)
@@ -69,7 +60,7 @@ def _numbered(parts: Integer[np.ndarray, " N"], radii: Float[np.ndarray, " N"]) 
         return np.zeros(len(parts), np.int64)
     surfaces = np.bincount(parts[some], radii[some] ** 2)
     order = np.argsort(-surfaces, kind="stable")
-    kept = order[surfaces[order] >= SMALLEST * surfaces.max()]
+    kept = order[surfaces[order] >= INSTANCES.smallest * surfaces.max()]
     names = np.zeros(len(surfaces) + 1, np.int64)  # the last for those that take no part
     names[kept] = np.arange(1, len(kept) + 1)
     return names[parts]
@@ -90,7 +81,7 @@ def _as_one(
         met = (there >= 0) & (there != own)
         pairs, which = np.unique(own[met] * np.int64(count) + there[met], return_inverse=True)
         ends = np.divmod(pairs, count)
-        least = _SHOWN * np.minimum(surfaces[ends[0]], surfaces[ends[1]])
+        least = INSTANCES.shown * np.minimum(surfaces[ends[0]], surfaces[ends[1]])
         enough = np.bincount(which, areas[met], len(pairs)) >= least
         graph += coo_matrix((enough, ends), (count, count))
     return np.append(connected_components(graph, directed=False)[1], -1)[parts]
@@ -104,7 +95,7 @@ def _shown_at(
     of_view: Bool[np.ndarray, " n"],
 ) -> Integer[np.ndarray, " n"]:
     """The part of which a photo's layer shows something where each of some Gaussians is: at its pixel, and at
-    its depth to within `SAME`; -1 where it does not."""
+    its depth to within `INSTANCES.same`; -1 where it does not."""
     viewmat, K = (values.detach().cpu().double() for values in (scene.viewmats[view], scene.Ks[view]))
     width, height = scene.view_size
     there = project_points(means, viewmat, K, (height, width))
@@ -114,11 +105,11 @@ def _shown_at(
     own = np.flatnonzero(inside & of_view)
     own = own[np.argsort(-logs[own], kind="stable")]  # of several in a pixel the nearest stays
     shown[pixels[own]], deep[pixels[own]] = parts[own], logs[own]
-    return np.where(inside & (np.abs(logs - deep[pixels]) <= SAME), shown[pixels], -1)
+    return np.where(inside & (np.abs(logs - deep[pixels]) <= INSTANCES.same), shown[pixels], -1)
 
 
 def connected(
-    gaussians: Gaussians, members: Bool[np.ndarray, " N"], link: float = LINK
+    gaussians: Gaussians, members: Bool[np.ndarray, " N"], link: float = INSTANCES.link
 ) -> tuple[Integer[np.ndarray, " N"], Float[np.ndarray, " N"]]:
     """A number from 0 for the connected part of each, -1 of what is no member or not finite; and their
     radii."""
@@ -137,7 +128,7 @@ def disc_radii(gaussians: Gaussians) -> Float[np.ndarray, " N"]:
 
 
 def touching(
-    gaussians: Gaussians, link: float = LINK
+    gaussians: Gaussians, link: float = INSTANCES.link
 ) -> tuple[Integer[np.ndarray, " m"], Integer[np.ndarray, " m"]]:
     """Rows of the pairs of Gaussians that touch, as `instances` says; what is not finite touches nothing."""
     means = gaussians.means.detach().cpu().double().numpy()
@@ -162,7 +153,7 @@ def _pairs(
     count = len(means)
     if not count:
         return np.zeros(0, int), np.zeros(0, int)
-    distances, others = KDTree(means).query(means, k=min(_NEIGHBOURS + 1, count))
+    distances, others = KDTree(means).query(means, k=min(INSTANCES.neighbours + 1, count))
     distances, others = np.reshape(distances, (count, -1)), np.reshape(others, (count, -1))
     near = distances <= link * (radii[:, None] + radii[others]) / 2
     return np.repeat(np.arange(count), near.sum(1)), others[near]

@@ -9,11 +9,8 @@ from langflash_core.errors import InputError
 from langflash_core.scene.changed import changed
 from langflash_core.scene.changes import Moved, Spot
 from langflash_core.scene.mask import Mask
+from langflash_core.scene.settings import JOINING
 from langflash_core.types import NO_LANGUAGE, Gaussians, Scene, Semantics
-
-MOST_ATOMS = 960  # that the picture can show together (app/gl/packed.py)
-_GAP = 0.1  # between both, of the first one's width
-_EDGE = 0.02  # share of the places on either side that counts as outliers
 
 
 @dataclass(frozen=True)
@@ -45,7 +42,8 @@ def joined(
             second comes; None: as it is.
 
     Raises:
-        InputError: their phrases mean different things, or together they have more than `MOST_ATOMS` atoms.
+        InputError: their phrases mean different things, or together they have more than `JOINING.most_atoms`
+            atoms.
         ValueError: the second has layers.
     """
     if second.layered:
@@ -152,7 +150,7 @@ def beside(first: Scene, second: Scene) -> Moved:
     if first.record.metric_scale and second.record.metric_scale:
         ratio = second.record.metric_scale / first.record.metric_scale
     ours, theirs = _box(first.gaussians), _box(second.gaussians)
-    gap = _GAP * float(ours.high[0] - ours.low[0])
+    gap = JOINING.gap * float(ours.high[0] - ours.low[0])
     right = float(ours.high[0]) + gap - ratio * float(theirs.low[0])
     down = float(ours.high[1]) - ratio * float(theirs.high[1])
     ahead = float(ours.low[2] + ours.high[2] - ratio * (theirs.low[2] + theirs.high[2])) / 2
@@ -171,10 +169,10 @@ def _check(first: Scene, second: Scene, names: tuple[str, str]) -> None:
             f"{names[1]} speaks {theirs.space} and {names[0]} speaks {ours.space}, so no phrase could be "
             "asked of both; merge scenes that the same preset made"
         )
-    if ours.num_atoms + theirs.num_atoms > MOST_ATOMS:
+    if ours.num_atoms + theirs.num_atoms > JOINING.most_atoms:
         raise InputError(
             f"{names[0]} and {names[1]} have {ours.num_atoms + theirs.num_atoms:,} groups together, at most "
-            f"{MOST_ATOMS} can be shown; merge groups in the dictionary first"
+            f"{JOINING.most_atoms} can be shown; merge groups in the dictionary first"
         )
 
 
@@ -185,7 +183,7 @@ def _box(gaussians: Gaussians) -> _Box:
         return _Box(torch.zeros(3), torch.zeros(3))
     ordered = means.sort(dim=0).values
     last = len(ordered) - 1
-    return _Box(ordered[round(_EDGE * last)], ordered[round((1 - _EDGE) * last)])
+    return _Box(ordered[round(JOINING.edge * last)], ordered[round((1 - JOINING.edge) * last)])
 
 
 def _stacked(first: Gaussians, second: Gaussians) -> Gaussians:

@@ -17,7 +17,8 @@ from torch import Tensor
 from torch.nn.functional import normalize
 
 from langflash_core.errors import InputError
-from langflash_core.scene.joining import MOST_ATOMS, appended
+from langflash_core.scene.joining import appended
+from langflash_core.scene.settings import JOINING
 from langflash_core.scene.thin import covered_areas
 from langflash_core.types import Scene
 
@@ -35,8 +36,10 @@ def with_lone_part(scene: Scene, part: Bool[Tensor, " N"], shown: Scene | None =
     if not bool(part.any()):
         raise ValueError("part: expected at least one Gaussian")
     number = scene.semantics.num_atoms
-    if number >= MOST_ATOMS:
-        raise InputError(f"at most {MOST_ATOMS} groups can be shown; merge groups in the dictionary first")
+    if number >= JOINING.most_atoms:
+        raise InputError(
+            f"at most {JOINING.most_atoms} groups can be shown; merge groups in the dictionary first"
+        )
     semantics = scene.semantics
     dictionary = torch.cat((semantics.dictionary, mean_meaning(scene, part)[None].to(semantics.dictionary)))
     whole = replace(scene, semantics=replace(semantics, dictionary=dictionary))

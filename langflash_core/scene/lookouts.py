@@ -23,25 +23,8 @@ from torch import Tensor
 
 from langflash_core.geometry.cameras import intrinsics_from_fov
 from langflash_core.scene.bare import middle_box, seen_rows
+from langflash_core.scene.settings import LOOKOUTS
 from langflash_core.types import Camera, Gaussians
-
-FOV = 70.0
-"""Degrees of the longer side: a phone's main lens."""
-_POINTS = 8_000  # that are looked at
-_ACROSS = 9  # eyes along each side of the ground
-_HEIGHTS = (0.4, 0.55, 0.75, 1.0)  # of the box, from its floor
-_AROUND = 1.7  # times the box, in which eyes are tried
-_DEEP = 0.5  # of the diagonal, that the box has at least: before a wall one stands, too
-_FREE = 0.07  # of the box's diagonal, within which an eye has nothing
-_FAR, _SPREAD = 0.4, 0.7  # of the diagonal, from which people look at things, and of its logarithm
-_WAYS = 12  # to look around
-_PITCHES = (0.0, 0.3)  # level, and a little down
-_DOWN, _AROUND_CELLS = 16, 32  # cells of a panorama
-_INFORMED = 0.05  # correlation of size and distance of the best eye, from which they tell anything
-_SURE, _DOUBTED = 3, 0.02
-"""By which power of its correlation an eye is believed, the best one wholly, and how much one is at least."""
-_LEAST = 0.02  # of what the first view adds, that another one adds
-_SURFACE = 1.1  # times the nearest distance in a cell, within which others are seen, too
 
 
 def lookouts(gaussians: Gaussians, count: int, size: tuple[int, int]) -> list[Camera]:
@@ -51,7 +34,7 @@ def lookouts(gaussians: Gaussians, count: int, size: tuple[int, int]) -> list[Ca
         gaussians: N >= 1, upright: +y is down. count: of cameras, at most. size: their (width, height).
     """
     rows = seen_rows(gaussians)
-    rows = rows[torch.linspace(0, len(rows) - 1, min(_POINTS, len(rows))).long()]
+    rows = rows[torch.linspace(0, len(rows) - 1, min(LOOKOUTS.points, len(rows))).long()]
     means = gaussians.means[rows].double().cpu()
     low, high = (corner.numpy() for corner in middle_box(means))
     inside = ((means.numpy() >= low) & (means.numpy() <= high)).all(1)
@@ -60,7 +43,7 @@ def lookouts(gaussians: Gaussians, count: int, size: tuple[int, int]) -> list[Ca
     diagonal = max(float(np.hypot(*(high - low)[[0, 2]])), least)
     panoramas = [_Panorama.of(eye, points, sizes) for eye in _eyes(low, high, points, diagonal)]
     trusts = _trusts(panoramas)
-    K = intrinsics_from_fov(FOV, *size)
+    K = intrinsics_from_fov(LOOKOUTS.fov, *size)
     halves = math.atan(size[0] / 2 / float(K[0, 0])), math.atan(size[1] / 2 / float(K[1, 1]))
     looks = [
         look
@@ -101,26 +84,32 @@ class _Panorama:
         ways = points - eye
         distance = np.linalg.norm(ways, axis=1).clip(1e-12)
         azimuth, below = np.arctan2(ways[:, 0], ways[:, 2]), np.arcsin((ways[:, 1] / distance).clip(-1, 1))
-        column = ((azimuth / (2 * math.pi) + 0.5) * _AROUND_CELLS).astype(int).clip(0, _AROUND_CELLS - 1)
-        row = ((below / math.pi + 0.5) * _DOWN).astype(int).clip(0, _DOWN - 1)
-        nearest = np.full((_DOWN, _AROUND_CELLS), np.inf)
+        column = (
+            ((azimuth / (2 * math.pi) + 0.5) * LOOKOUTS.around_cells)
+            .astype(int)
+            .clip(0, LOOKOUTS.around_cells - 1)
+        )
+        row = ((below / math.pi + 0.5) * LOOKOUTS.down).astype(int).clip(0, LOOKOUTS.down - 1)
+        nearest = np.full((LOOKOUTS.down, LOOKOUTS.around_cells), np.inf)
         np.minimum.at(nearest, (row, column), distance)
-        seen = np.flatnonzero(distance <= _SURFACE * nearest[row, column])
+        seen = np.flatnonzero(distance <= LOOKOUTS.surface * nearest[row, column])
         alike = _correlation(np.log(distance[seen]), sizes[seen])
         return _Panorama(eye, seen, azimuth[seen], below[seen], distance[seen], nearest, alike)
 
     def looks(self, halves: tuple[float, float], diagonal: float, trust: float) -> Iterator[_Look]:
         """All around; halves: angles that half of a picture takes, across and down. trust: that cameras stood
         here, in [0, 1]."""
-        fits = np.exp(-((np.log(self.distance / (_FAR * diagonal)) / _SPREAD) ** 2) / 2)
-        cells = ((np.arange(_AROUND_CELLS) + 0.5) / _AROUND_CELLS - 0.5) * 2 * math.pi
-        lines = ((np.arange(_DOWN) + 0.5) / _DOWN - 0.5) * math.pi
-        for pitch in _PITCHES:
-            for yaw in 2 * math.pi * np.arange(_WAYS) / _WAYS:
+        fits = np.exp(-((np.log(self.distance / (LOOKOUTS.far * diagonal)) / LOOKOUTS.spread) ** 2) / 2)
+        cells = ((np.arange(LOOKOUTS.around_cells) + 0.5) / LOOKOUTS.around_cells - 0.5) * 2 * math.pi
+        lines = ((np.arange(LOOKOUTS.down) + 0.5) / LOOKOUTS.down - 0.5) * math.pi
+        for pitch in LOOKOUTS.pitches:
+            for yaw in 2 * math.pi * np.arange(LOOKOUTS.ways) / LOOKOUTS.ways:
                 inside = _within(self.azimuth, yaw, halves[0]) & (np.abs(self.below - pitch) < halves[1])
                 window = np.ix_(np.abs(lines - pitch) < halves[1], _within(cells, yaw, halves[0]))
                 far = self.nearest[window]
-                good = float((np.isfinite(far) & (far > _FREE * diagonal)).mean()) if far.size else 0.0
+                good = (
+                    float((np.isfinite(far) & (far > LOOKOUTS.free * diagonal)).mean()) if far.size else 0.0
+                )
                 counts = trust * good**2 * fits[inside]
                 yield _Look(self.eye, float(yaw), pitch, self.seen[inside], counts)
 
@@ -135,8 +124,12 @@ def _trusts(panoramas: Sequence[_Panorama]) -> np.ndarray:
     """That cameras stood at eyes (E,), in [0, 1]: by their correlation beside the best one's, and by how much
     they see, which behind a wall is that wall, whose sizes are the same from both sides."""
     alike, seen = np.array([[eye.alike, len(eye.seen)] for eye in panoramas]).T
-    told = alike.max() > _INFORMED
-    trusts = ((alike / alike.max()).clip(0) ** _SURE).clip(_DOUBTED) if told else np.ones(len(alike))
+    told = alike.max() > LOOKOUTS.informed
+    trusts = (
+        ((alike / alike.max()).clip(0) ** LOOKOUTS.sure).clip(LOOKOUTS.doubted)
+        if told
+        else np.ones(len(alike))
+    )
     return trusts * seen / max(seen.max(), 1)
 
 
@@ -155,12 +148,12 @@ def _eyes(low: np.ndarray, high: np.ndarray, points: np.ndarray, diagonal: float
     """Places (E, 3) all over a box and around it that have nothing near; its middle where there is none."""
     from scipy.spatial import KDTree
 
-    middle, half = (low + high) / 2, _AROUND * (high - low).clip(_DEEP * diagonal) / 2
-    steps = np.linspace(-1, 1, _ACROSS)
-    heights = high[1] - np.array(_HEIGHTS) * (high[1] - low[1])
+    middle, half = (low + high) / 2, LOOKOUTS.around * (high - low).clip(LOOKOUTS.deep * diagonal) / 2
+    steps = np.linspace(-1, 1, LOOKOUTS.across)
+    heights = high[1] - np.array(LOOKOUTS.heights) * (high[1] - low[1])
     grid = np.meshgrid(middle[0] + half[0] * steps, heights, middle[2] + half[2] * steps, indexing="ij")
     eyes = np.stack(grid, -1).reshape(-1, 3)
-    free = KDTree(points).query(eyes)[0] > _FREE * diagonal
+    free = KDTree(points).query(eyes)[0] > LOOKOUTS.free * diagonal
     return eyes[free] if free.any() else middle[None]
 
 
@@ -171,7 +164,7 @@ def _best(looks: list[_Look], num_points: int, count: int) -> Iterator[_Look]:
         gains = [float((k.counts - known[k.shown]).clip(0).sum()) for k in looks]
         best = int(np.argmax(gains))
         first = max(first, gains[best])
-        if not gains[best] > _LEAST * first:
+        if not gains[best] > LOOKOUTS.least * first:
             return
         yield looks[best]
         known[looks[best].shown] = np.maximum(known[looks[best].shown], looks[best].counts)

@@ -5,14 +5,14 @@ neighbours side by side in their photo, or where two photos show the same place,
 are neighbours of one atom and one colour between which depth does not jump. Then those two regions are
 joined, again and again, that differ least, which makes a tree. Of regions a and b
 
-    (LANGUAGE (1 - cos(F_a, F_b)) + COLOUR |c_a - c_b| + JUMP j_ab + ALONE (1 - o_ab)) s^(1/4)
+    (language (1 - cos(F_a, F_b)) + colour |c_a - c_b| + jump j_ab + alone (1 - o_ab)) s^(1/4)
 
-is what they differ by: F what a region means, c its mean colour, j_ab the share of their common border along
-which depth jumps (where two photos show the same place it does not), o_ab the overlap of two that no photo
-shows side by side, s the smaller one's share of the photos that show it. A region's height is the difference
-that made it, and its border holds from there up to the height of the next one. Of the regions around it a
-click takes the one whose border holds longest, as a ratio, within `THING`; somewhat rather one of a single
-atom, and one that the next is much larger than.
+is what they differ by, with the weights of `REGIONS`: F what a region means, c its mean colour, j_ab the
+share of their common border along which depth jumps (where two photos show the same place it does not), o_ab
+the overlap of two that no photo shows side by side, s the smaller one's share of the photos that show it. A
+region's height is the difference that made it, and its border holds from there up to the height of the next
+one. Of the regions around it a click takes the one whose border holds longest, as a ratio, within
+`REGIONS.thing`; somewhat rather one of a single atom, and one that the next is much larger than.
 
 Pairs that are each other's nearest are joined at once, which gives the same tree as one pair after the other
 where no two come nearer to a third by being joined (Bruynooghe 1978), so nearly the same here.
@@ -36,28 +36,9 @@ from langflash_core.geometry.harmonics import SH_C0
 from langflash_core.rig.projected import project_points
 from langflash_core.scene.instances import touching
 from langflash_core.scene.selection import strongest_atoms
+from langflash_core.scene.settings import REGIONS
 from langflash_core.scene.thin import covered_areas
 from langflash_core.types import Scene
-
-LANGUAGE, COLOUR, JUMP, ALONE = 1.5, 1.0, 0.6, 1.0
-"""What counts how much; colours in CIELAB over 100."""
-THING = (0.06, 0.30)
-"""Heights between which the border of a thing is looked for."""
-GROWTH, OF_ONE = 0.2, 0.15
-"""Powers of what tells a thing, beside how long its border holds: by how much the next region is larger, and
-how much of it is of the atom that was clicked. All numbers here were chosen on 12 held-out rooms (seeds
-900000200 to 211) beyond those that are judged; these and `THING` also on those of `tests.tools.clicks`."""
-_MOST_GROWTH = 4.0  # times as large, from which a next region tells no more
-_SIZE = 0.25  # power of the smaller region's share of the photos: specks are joined first
-_STEP = 0.03  # of the logarithm of depth from a pixel to the next, beyond twice the steps beside: a jump
-_SAME = 0.05  # of the logarithm of depth, within which two photos show the same place
-_SHADE = 0.03  # of a colour, up to which neighbours are of one leaf
-_FILLED = 8  # pixels that a Gaussian may be away from a pixel that it stands for
-_PARTNERS = 4  # photos that each is compared with: what more of them show is joined by way of these
-_LEAST_OVERLAP = 0.1  # of the smaller of two regions, below which they do not meet
-_STEPS = 1.25  # times as large: the next level of a click
-_LEAST_THING = 0.0005  # of a photo: smaller regions are specks, unless someone asks for less
-_ALL = 0.9  # of the scene: a region so large is no group
 
 
 @dataclass(frozen=True)
@@ -115,14 +96,14 @@ class Regions:
 
     def _thing(self, way: list[int]) -> int:
         """Which region of the way from a leaf up is a thing."""
-        low, high = THING
+        low, high = REGIONS.thing
         heights, sizes = self.heights[way], self.sizes[way]
         ends = np.append(heights[1:], np.inf)
         lives = np.minimum(ends, high) / np.maximum(heights, low)
-        large = sizes >= _LEAST_THING
+        large = sizes >= REGIONS.least_thing
         lives[(heights > high) | (ends < low) | ~large] = 0.0
-        grows = np.minimum(np.append(sizes[1:] / sizes[:-1], 1.0), _MOST_GROWTH)
-        likely = lives * grows**GROWTH * self._alike(way) ** OF_ONE
+        grows = np.minimum(np.append(sizes[1:] / sizes[:-1], 1.0), REGIONS.most_growth)
+        likely = lives * grows**REGIONS.growth * self._alike(way) ** REGIONS.of_one
         return int(likely.argmax() if likely.any() else large.argmax())
 
     def _alike(self, way: list[int]) -> Float[np.ndarray, " w"]:
@@ -138,10 +119,10 @@ class Regions:
         whole = self.sizes[self.parents < 0].sum()
         levels = [way[thing]]
         for region in reversed(way[:thing]):
-            if self.sizes[region] * _STEPS <= self.sizes[levels[0]]:
+            if self.sizes[region] * REGIONS.steps <= self.sizes[levels[0]]:
                 levels.insert(0, region)
         for region in way[thing + 1 :]:
-            if _ALL * whole >= self.sizes[region] >= _STEPS * self.sizes[levels[-1]]:
+            if REGIONS.all * whole >= self.sizes[region] >= REGIONS.steps * self.sizes[levels[-1]]:
                 levels.append(region)
         return levels
 
@@ -153,7 +134,7 @@ def regions_of(scene: Scene) -> Regions:
     if not len(nodes.atoms):
         return Regions(nodes.own, np.zeros(0, int), np.zeros(0), np.zeros(0), np.zeros(0, int))
     first, second = nodes.pairs
-    near = np.linalg.norm(nodes.colours[first] - nodes.colours[second], axis=1) < _SHADE
+    near = np.linalg.norm(nodes.colours[first] - nodes.colours[second], axis=1) < REGIONS.shade
     same = near & (nodes.atoms[first] == nodes.atoms[second]) & (nodes.jumps < 0.5) & nodes.beside
     leaves = _connected(first[same], second[same], len(nodes.atoms))
     tree = _Joining.of(nodes, leaves, _meaning(scene)).done()
@@ -279,7 +260,7 @@ class _Grid:
         which = np.asarray(distance_transform_edt(~known, return_distances=False, return_indices=True))
         nearest = which[0] * width + which[1]
         far = np.hypot(*(which - np.indices(known.shape)))
-        front = np.where(far <= _FILLED, front[nearest], -1)
+        front = np.where(far <= REGIONS.filled, front[nearest], -1)
         depths = depths[nearest]
         return _Grid(view, rows, _settled(at, z, depths), at, front, nearest, depths, np.exp(weights))
 
@@ -298,7 +279,7 @@ def _settled(
     goes through it."""
     height, width = depths.shape
     flat, pixels = depths.ravel(), at.copy()
-    off = np.flatnonzero(np.abs(z - flat[at]) > _STEP)
+    off = np.flatnonzero(np.abs(z - flat[at]) > REGIONS.step)
     lines, columns = np.divmod(at[off], width)
     best = np.abs(z[off] - flat[at[off]])
     for down in (-1, 0, 1):
@@ -325,7 +306,7 @@ def _within(grids: list[_Grid], pixels: int) -> Iterator[_Links]:
             if not steps.size:
                 continue
             beside = np.minimum(np.vstack((steps[:1], steps[:-1])), np.vstack((steps[1:], steps[-1:])))
-            jumps = ((steps - 2 * beside) / _STEP).clip(0, 1)
+            jumps = ((steps - 2 * beside) / REGIONS.step).clip(0, 1)
             both = there[1:] & there[:-1]
             yield places[:-1][both], places[1:][both], jumps[both], np.ones(int(both.sum()), bool)
 
@@ -336,7 +317,7 @@ def _across(scene: Scene, grids: list[_Grid], pixels: int) -> Iterator[_Links]:
     for number, grid in enumerate(grids):
         apart = [_apart(poses[grid.view], poses[other.view]) for other in grids]
         partners = [other for other in np.argsort(apart, kind="stable") if other != number]
-        for other in partners[:_PARTNERS]:
+        for other in partners[: REGIONS.partners]:
             pair = number * pixels, other * pixels
             here, there = _same_places(scene, grid, grids[other])
             yield pair[0] + here, pair[1] + there, np.zeros(len(here)), np.zeros(len(here), bool)
@@ -356,7 +337,10 @@ def _same_places(scene: Scene, grid: _Grid, other: _Grid) -> tuple[np.ndarray, n
     projected = project_points(points.contiguous(), mats[other.view], Ks[other.view], (height, width))
     inside = projected.inside.numpy() & (grid.front.ravel() >= 0)
     there = np.where(inside, projected.pixels.numpy(), 0)
-    same = np.abs(np.log(np.where(inside, projected.z.numpy(), 1.0)) - other.depths.ravel()[there]) <= _SAME
+    same = (
+        np.abs(np.log(np.where(inside, projected.z.numpy(), 1.0)) - other.depths.ravel()[there])
+        <= REGIONS.same
+    )
     same &= inside & (other.front.ravel()[there] >= 0)
     return np.flatnonzero(same), there[same]
 
@@ -433,9 +417,14 @@ class _Joining:
         side = self.borders > 0
         jump = np.where(side, self.jumps / np.maximum(self.borders + self.overlaps, 1e-9), 0.0)
         shares = self.sizes / self.seen.sum(1)
-        total = LANGUAGE * language + COLOUR * colour + JUMP * jump + ALONE * np.where(side, 0, 1 - overlap)
-        total *= np.minimum(shares[first], shares[second]) ** _SIZE
-        return np.where(side | (overlap >= _LEAST_OVERLAP), total, np.inf)
+        total = (
+            REGIONS.language * language
+            + REGIONS.colour * colour
+            + REGIONS.jump * jump
+            + REGIONS.alone * np.where(side, 0, 1 - overlap)
+        )
+        total *= np.minimum(shares[first], shares[second]) ** REGIONS.size
+        return np.where(side | (overlap >= REGIONS.least_overlap), total, np.inf)
 
     def done(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
         """Parents, heights and sizes of the tree."""

@@ -10,15 +10,13 @@ from langflash_core.base.records import FoundLens, Guess, Record, World, check_l
 from langflash_core.scene.container import damaged, read_container
 from langflash_core.scene.doubts import told_warnings
 from langflash_core.scene.record import from_json
+from langflash_core.scene.settings import REPORT
 from langflash_core.scene.tour import read_tour
 
 if TYPE_CHECKING:
     from langflash_core.types import Scene
 
-_CORE = (0.01, 0.99)  # the middle 98 % along each axis: stray points do not stretch the box
 _PHOTO = "photo_"
-_NAMED = 4  # photos, of which it is said what was left out
-_SHORT = 40  # letters, up to which names of photos are read; else photos are numbered
 
 
 def describe(scene: "Scene") -> dict:
@@ -154,17 +152,21 @@ def _is_text(value: object) -> bool:
 
 def _unplaced(left_out: Mapping[str, Any]) -> str:
     names = unplaced_names(left_out)
-    more = f" and {_others(len(names) - _NAMED)}" if len(names) > _NAMED else ""
-    return f"{', '.join(names[:_NAMED])}{more} could not be placed" if names else ""
+    more = f" and {_others(len(names) - REPORT.named)}" if len(names) > REPORT.named else ""
+    return f"{', '.join(names[: REPORT.named])}{more} could not be placed" if names else ""
 
 
 def _shares_line(shares: tuple[float, ...], names: Sequence[str]) -> str:
     some = [(share, view) for view, share in enumerate(shares) if share > 0]
-    most = sorted(sorted(some, reverse=True)[:_NAMED], key=lambda one: one[1])
-    apart = len(names) == len(set(names)) == len(shares) and all(0 < len(name) <= _SHORT for name in names)
+    most = sorted(sorted(some, reverse=True)[: REPORT.named], key=lambda one: one[1])
+    apart = len(names) == len(set(names)) == len(shares) and all(
+        0 < len(name) <= REPORT.short for name in names
+    )
     called = names if apart else [f"photo {number}" for number in range(1, len(shares) + 1)]
     parts = [f"{max(1, round(100 * share))} % of {called[view]}" for share, view in most]
-    return ", ".join(parts) + (f" and some of {_others(len(some) - _NAMED)}" if len(some) > _NAMED else "")
+    return ", ".join(parts) + (
+        f" and some of {_others(len(some) - REPORT.named)}" if len(some) > REPORT.named else ""
+    )
 
 
 def _others(count: int) -> str:
@@ -231,7 +233,7 @@ def _document(
         "space": space,
         "bytes": {**sizes, "total": sum(sizes.values())},
         "bounding_box": _box(means, (0.0, 1.0)),
-        "core_box": _box(means, _CORE),
+        "core_box": _box(means, REPORT.core),
         "metric_scale": known.metric_scale,
         "world": None if known.world is None else world_to_json(known.world),
         "counts": dict(known.counts),

@@ -4,11 +4,8 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 from scipy.spatial import KDTree
 
+from langflash_core.scene.settings import SELECTION
 from langflash_core.types import Gaussians, Semantics
-
-NEIGHBOURS = 12  # that a Gaussian on a surface has around it, two rings of a square grid
-_MAD_TO_DEVIATION = 1.4826  # of a normal distribution
-_LEAST_DEVIATION = 0.1  # of a logarithm: a perfect grid has spread 0, and tenths there are no news
 
 
 def grow(
@@ -77,13 +74,15 @@ def isolation(gaussians: Gaussians, visible: Bool[np.ndarray, " N"]) -> Float[np
     means = gaussians.means.detach().cpu().double().numpy()[rows]
     scales = gaussians.scales.detach().cpu().double().amax(-1).numpy()[rows]
     opacities = np.clip(gaussians.opacities.detach().cpu().double().numpy()[rows], 1e-3, 1.0)
-    count = min(NEIGHBOURS + 1, len(rows))
+    count = min(SELECTION.neighbours + 1, len(rows))
     distances, neighbours = KDTree(means).query(means, k=count)
     apart = np.maximum(np.asarray(distances)[:, 1:].mean(1), 1e-12)
     support = opacities[np.asarray(neighbours)[:, 1:]].mean(1)
     loneliness = np.log(apart / np.maximum(scales, 1e-12)) - 0.5 * np.log(opacities * support)
     middle = np.median(loneliness)
-    deviation = max(_MAD_TO_DEVIATION * np.median(abs(loneliness - middle)), _LEAST_DEVIATION)
+    deviation = max(
+        SELECTION.mad_to_deviation * np.median(abs(loneliness - middle)), SELECTION.least_deviation
+    )
     scores[rows] = (loneliness - middle) / deviation
     return scores
 

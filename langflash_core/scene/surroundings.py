@@ -2,7 +2,7 @@
 
 Of every photo a grid of samples, each the place of what it shows there, of the size of its cell. A sample is
 known from its photo's side alone: who comes from behind a wall is not held by it, and sees nothing that a
-photo saw. Numpy alone, so that a hand asks it in every frame: some .2 ms for `MOST` samples.
+photo saw. Numpy alone, so that a hand asks it in every frame: some .2 ms for `SURROUNDINGS.most` samples.
 
 Sizes: n samples, V photos, N Gaussians.
 """
@@ -17,24 +17,10 @@ from jaxtyping import Bool, Float, Integer
 from langflash_core.geometry.nearness import Nearness
 from langflash_core.geometry.pinhole import see
 from langflash_core.geometry.poses import NEAREST, Pose, intrinsics, viewmat
+from langflash_core.scene.settings import SURROUNDINGS
 
 if TYPE_CHECKING:
     from langflash_core.types import Scene
-
-MOST = 9000
-"""Samples of a scene."""
-A_PHOTO = 32 * 24  # cells of a photo's grid, at the most
-QUANTILES = (0.1, 0.5, 0.9)
-"""Of the depths in a cell, each a sample: a table seen aslant has no hole, and an edge both its sides."""
-SOLID = 0.1  # opacity from which a Gaussian is a surface
-CLEAR = 0.18
-"""Of the scene's depth, that a camera keeps from surfaces: what is nearer than a tenth fills the picture with
-a few Gaussians, and samples lie up to a tenth apart."""
-ASIDE = math.cos(math.radians(60.0))
-"""Degrees between camera and photo, at a surface, up to which it counts as seen: there a picture has faded to
-the half (langflash_core/scene/trust.py)."""
-CELLS = (16, 12)  # of a picture, of which it is asked whether they show something
-_LEVELS = 5  # of cells, each twice as large: the largest is the picture
 
 
 @dataclass(frozen=True)
@@ -63,7 +49,7 @@ class Surroundings:
     @property
     def clear(self) -> float:
         """Scene units that a camera keeps from surfaces."""
-        return CLEAR * self.depth
+        return SURROUNDINGS.clear * self.depth
 
     def nearest(self, centre: Float[np.ndarray, "3"]) -> tuple[float, Float[np.ndarray, "3"]]:
         """Distance of the nearest surface that faces a place, and the way there (3,); infinity and 0 where
@@ -87,19 +73,19 @@ class Surroundings:
         places, own = self.places[inside], self.eyes[inside] - self.places[inside]
         ways = np.array(pose.centre) - places
         lengths = np.sqrt(np.einsum("nc,nc->n", ways, ways) * np.einsum("nc,nc->n", own, own))
-        near = np.einsum("nc,nc->n", ways, own) > ASIDE * lengths
+        near = np.einsum("nc,nc->n", ways, own) > SURROUNDINGS.aside * lengths
         across = focal * self.sizes[inside][near]
         if pose.span is None:
             across /= depths[near]
-        levels = np.ceil(np.log2(np.maximum(across, 1.0))).clip(max=_LEVELS - 1)
+        levels = np.ceil(np.log2(np.maximum(across, 1.0))).clip(max=SURROUNDINGS.levels - 1)
         x, y = pixels[near].astype(int).T
-        shown = np.zeros(CELLS, bool)
-        for level in range(_LEVELS):  # a sample covers the cell of about its size
+        shown = np.zeros(SURROUNDINGS.cells, bool)
+        for level in range(SURROUNDINGS.levels):  # a sample covers the cell of about its size
             some = levels == level
-            coarse = np.zeros([math.ceil(side / 2**level) for side in CELLS], bool)
+            coarse = np.zeros([math.ceil(side / 2**level) for side in SURROUNDINGS.cells], bool)
             coarse[x[some] >> level, y[some] >> level] = True
             grown = coarse.repeat(1 << level, 0).repeat(1 << level, 1)
-            shown |= grown[: CELLS[0], : CELLS[1]]
+            shown |= grown[: SURROUNDINGS.cells[0], : SURROUNDINGS.cells[1]]
         return float(shown.mean())
 
     def middle(self, pose: Pose) -> float | None:
@@ -114,8 +100,9 @@ class Surroundings:
         """Depths and cells of the samples in a picture, cells per unit at depth 1, and which samples."""
         wide = 1000 if pose.aspect >= 1 else round(1000 * pose.aspect)
         high = round(wide / pose.aspect)
-        K = intrinsics(pose, wide, high) * np.array([[CELLS[0] / wide], [CELLS[1] / high], [1.0]])
-        x, y, z, within = see(self.places, viewmat(pose), K, CELLS, NEAREST, pose.span is not None)
+        cells = SURROUNDINGS.cells
+        K = intrinsics(pose, wide, high) * np.array([[cells[0] / wide], [cells[1] / high], [1.0]])
+        x, y, z, within = see(self.places, viewmat(pose), K, cells, NEAREST, pose.span is not None)
         inside = np.flatnonzero(within)
         return z[inside], np.stack((x[inside], y[inside]), 1), float(K[0, 0]), inside
 
@@ -125,7 +112,7 @@ def surroundings_of(scene: "Scene") -> Surroundings | None:
     if scene.view_ids is None:
         return None
     ids = scene.view_ids.cpu().numpy()
-    solid = scene.gaussians.opacities.detach().cpu().numpy() > SOLID
+    solid = scene.gaussians.opacities.detach().cpu().numpy() > SURROUNDINGS.solid
     means = scene.gaussians.means.detach().cpu().double().numpy()
     views = [view for view in np.unique(ids[solid]).tolist() if view >= 0]
     found = [
@@ -143,10 +130,10 @@ def _sampled(
     scene: "Scene", view: int, own: Integer[np.ndarray, " m"], means: Float[np.ndarray, "N 3"], count: int
 ) -> tuple[Integer[np.ndarray, " n"], Float[np.ndarray, " n"], Float[np.ndarray, "n 3"]]:
     """Rows, sizes and eyes of a photo's samples, of `count` photos: of each cell of its grid the Gaussians at
-    `QUANTILES` of depth."""
+    `SURROUNDINGS.quantiles` of depth."""
     matrix, K = scene.viewmats[view].double().numpy(), scene.Ks[view].double().numpy()
     width, height = scene.view_size
-    cells_each = min(A_PHOTO, MOST / len(QUANTILES) / count)
+    cells_each = min(SURROUNDINGS.a_photo, SURROUNDINGS.most / len(SURROUNDINGS.quantiles) / count)
     wide = round(math.sqrt(cells_each * width / height)) or 1
     cell = width / wide
     high = math.ceil(height / cell)
@@ -155,6 +142,8 @@ def _sampled(
     cells = (y[seen] / cell).astype(int) * wide + (x[seen] / cell).astype(int)
     order = np.lexsort((z[seen], cells))
     _, starts, counts = np.unique(cells[order], return_index=True, return_counts=True)
-    picked = seen[order[np.unique([starts + (share * counts).astype(int) for share in QUANTILES])]]
+    picked = seen[
+        order[np.unique([starts + (share * counts).astype(int) for share in SURROUNDINGS.quantiles])]
+    ]
     centre = -matrix[:3, :3].T @ matrix[:3, 3]
     return own[picked], z[picked] * cell / float(K[0, 0]), np.tile(centre, (len(picked), 1))

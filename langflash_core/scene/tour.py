@@ -17,9 +17,7 @@ from typing import Any
 
 from langflash_core.errors import InputError
 from langflash_core.geometry.poses import Pose, Vector, read_pose, told_pose
-
-MOST_STOPS, MOST_NOTES = 100, 200
-LONGEST_NAME, LONGEST_TEXT = 60, 400  # letters
+from langflash_core.scene.settings import TOURS
 
 
 @dataclass(frozen=True)
@@ -132,7 +130,7 @@ def checked(tour: Tour) -> Tour:
     )
     notes = tuple(replace(n, text=n.text.strip(), phrase=_line(n.phrase)) for n in tour.notes)
     tour = Tour(stops, notes, _line(tour.start))
-    for what, most, found in (("stops", MOST_STOPS, stops), ("notes", MOST_NOTES, notes)):
+    for what, most, found in (("stops", TOURS.most_stops, stops), ("notes", TOURS.most_notes, notes)):
         if len(found) > most:
             raise InputError(f"a tour has at most {most} {what}, not {len(found)}; remove some")
     _check_words(tour)
@@ -144,8 +142,10 @@ def _check_words(tour: Tour) -> None:
     InputError: a name is missing, twice there or unknown, or a text is missing or too long.
     """
     for name in tour.names:
-        if not name or len(name) > LONGEST_NAME:
-            raise InputError(f"a stop's name has 1 to {LONGEST_NAME} letters, not {len(name)}; name it anew")
+        if not name or len(name) > TOURS.longest_name:
+            raise InputError(
+                f"a stop's name has 1 to {TOURS.longest_name} letters, not {len(name)}; name it anew"
+            )
         if tour.names.count(name) > 1:
             raise InputError(f"there is a stop called {name} already; choose another name")
     if tour.start and tour.start not in tour.names:
@@ -156,8 +156,8 @@ def _check_words(tour: Tour) -> None:
         if not note.text and note.to is None and not note.phrase:
             raise InputError("a note says nothing; give it a text, a phrase, or a second point to measure to")
     texts = [text for each in (*tour.stops, *tour.notes) for text in (each.text, each.phrase)]
-    if any(len(text) > LONGEST_TEXT for text in texts):
-        raise InputError(f"a text has at most {LONGEST_TEXT} letters; say it shorter")
+    if any(len(text) > TOURS.longest_text for text in texts):
+        raise InputError(f"a text has at most {TOURS.longest_text} letters; say it shorter")
 
 
 def _line(text: str) -> str:

@@ -16,12 +16,10 @@ from torch import Tensor
 
 from langflash_core.errors import InputError
 from langflash_core.geometry.cameras import invert_rigid, transform, unproject
+from langflash_core.scene.settings import TRUST
 from langflash_core.types import Camera, Frame, Scene
 
-FULL, NONE = 30.0, 75.0
-"""Degrees aside up to which a surface is shown whole, and from which it is not shown at all. Chosen by eye on
-the demo pairs: at 45 degrees a table still stands, at 65 what was smeared behind things hides them."""
-COSINES = math.cos(math.radians(NONE)), math.cos(math.radians(FULL))
+COSINES = math.cos(math.radians(TRUST.none)), math.cos(math.radians(TRUST.full))
 
 
 def trust(
@@ -29,7 +27,7 @@ def trust(
 ) -> Float[Tensor, "*n"]:
     """How far surfaces are known as they are seen from `eye`, in [0, 1]; exactly 1 from a photo's own place.
 
-    Smoothstep of the cosine of the angle to the nearest photo, between `NONE` and `FULL` degrees.
+    Smoothstep of the cosine of the angle to the nearest photo, between `TRUST.none` and `TRUST.full` degrees.
 
     Args:
         points: on surfaces. eyes: places of the photos; all in one world.

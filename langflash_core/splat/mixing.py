@@ -20,29 +20,16 @@ import scipy.sparse
 from jaxtyping import Bool
 
 from langflash_core.splat.projection import ALPHA_MAX, Footprints
+from langflash_core.splat.settings import MIXING
 from langflash_core.types import Camera
-
-FAINT, SMALL = 1 / 64, 0.01
-"""Alpha, and contribution, below which a pair is left out here: footprints end at 2.9 deviations instead of
-3.3, and two thirds of all pairs go, 2 % of the light. Solved with and without them, pictures differ by 0.1 dB
-where they are 32 dB from a photo."""
-_WIDE = 128  # pixels, a side from which footprints are cut to the picture
-_AT_ONCE = 1 << 18  # pairs in work at once: within a core's cache
-_SLABS, _LEAST_SLAB = 8, 8192  # of Gaussians by depth, and how many one has at least
-_CELLS = (
-    8,
-    16,
-    32,
-    64,
-)  # pixels, in which pixels that still let light pass are sought for a footprint's square
 
 
 def mixing(
     footprints: Footprints,
     camera: Camera,
     count: int,
-    faint: float = FAINT,
-    small: float = SMALL,
+    faint: float = MIXING.faint,
+    small: float = MIXING.small,
     wanted: Bool[np.ndarray, "H W"] | None = None,
 ) -> scipy.sparse.csr_matrix:
     """Contributions (H*W, N) float32 of N Gaussians to the pixels of a view, row by row, front to back.
@@ -73,7 +60,7 @@ def mixing(
 
 def _slabs(count: int) -> int:
     """How many slabs are gone through: of few Gaussians one."""
-    return min(max(count // _LEAST_SLAB, 1), _SLABS)
+    return min(max(count // MIXING.least_slab, 1), MIXING.slabs)
 
 
 def _joined(
@@ -102,7 +89,7 @@ def _pairs(
     (n + 1,); of pixels (H W,) that are `clear`."""
     counts, found = np.zeros(len(rows), np.int64), []
     for places in table.alike(rows):
-        step = max(1, _AT_ONCE // int(table.sides[rows[places[0]]]) ** 2)
+        step = max(1, MIXING.at_once // int(table.sides[rows[places[0]]]) ** 2)
         for some in np.split(places, range(step, len(places), step)):
             kept, alphas, pixels = table.pairs(rows[some], camera, faint, clear)
             counts[some] = kept
@@ -137,11 +124,11 @@ class _Table:
         sides = np.ceil(2 * half).astype(np.int64) + 2
         size = np.array([camera.width, camera.height])
         # Of large ones, what lies in the picture: a surface that another photo has close before its lens.
-        wide = sides > _WIDE
-        low = np.clip(np.where(wide[:, None], np.maximum(low, 0), low), -_WIDE, 2 * size.max())
+        wide = sides > MIXING.wide
+        low = np.clip(np.where(wide[:, None], np.maximum(low, 0), low), -MIXING.wide, 2 * size.max())
         within = (np.minimum(low + sides[:, None], size) - low).max(1).astype(np.int64)
         sides = np.where(wide, np.maximum(within, 1), sides)
-        classes = np.array([*range(4, 17), 20, 24, 32, 48, 64, 96, _WIDE, 192, 256, 384, 512, 768])
+        classes = np.array([*range(4, 17), 20, 24, 32, 48, 64, 96, MIXING.wide, 192, 256, 384, 512, 768])
         classes = np.append(classes, max(1024, size.max()))
         inverse = np.stack((1 / roots[:, 0], roots[:, 1] / roots[:, 2], 1 / roots[:, 2]), -1)
         return _Table(
@@ -158,7 +145,7 @@ class _Table:
     def seen(self, rows: np.ndarray, clear: np.ndarray) -> np.ndarray:
         """(n,) bool: the square of each row may hold a pixel that is `clear`, (H, W) bool."""
         found, sides = np.ones(len(rows), bool), self.sides[rows]
-        for cell in _CELLS:
+        for cell in MIXING.cells:
             some = np.flatnonzero((sides <= cell) & (sides > cell // 2))
             if len(some) == 0:
                 continue
@@ -219,7 +206,7 @@ def _composited(
     `small` left out. `light`: (H W,) log T before them, and behind them afterwards. Some pixels at a time, so
     that what is made on the way stays within a core's cache."""
     starts = rows.indptr
-    cuts = np.searchsorted(starts, np.arange(0, starts[-1], _AT_ONCE // 4))
+    cuts = np.searchsorted(starts, np.arange(0, starts[-1], MIXING.at_once // 4))
     bounds = np.unique(np.concatenate((cuts, [0, len(starts) - 1])))
     shares, columns, counts = [], [], []
     for first, last in pairwise(bounds):

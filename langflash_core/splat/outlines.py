@@ -1,8 +1,8 @@
 """Outlines of a part of a scene in a picture: fast enough to follow a selection, and for the eye alone.
 
 Gaussians are squares as wide as their discs on a small grid. A pixel is of the part where the nearest of its
-squares is as near as the nearest of all, but for `_BESIDE`. In a scene of layers those count that the picture
-is blended of.
+squares is as near as the nearest of all, but for `OUTLINES.beside`. In a scene of layers those count that the
+picture is blended of.
 
 Sizes: N Gaussians, H W pixels of the grid, n points of a line.
 """
@@ -14,16 +14,10 @@ from jaxtyping import Bool, Float
 
 from langflash_core.geometry.nearness import Nearness
 from langflash_core.geometry.pinhole import see
+from langflash_core.splat.settings import OUTLINES
 from langflash_core.types import Camera, Scene
 
 from .projection import NEAR
-
-SIDE = 320
-"""Pixels of the grid's longer side: a line a few pixels off would be seen, a finer one takes longer."""
-_BESIDE = 1.05  # of the depth of what is before it: as far as layers show the same
-_WIDEST = 6  # pixels of a square, to each side: larger Gaussians have neighbours within it
-_LEAST = 6  # pixels of an area that has a line
-_SMOOTH = 0.6  # pixels that a line may leave the border of pixels
 
 
 def outlines(
@@ -34,12 +28,14 @@ def outlines(
     Args:
         visible: (N,) bool, what takes part, and covers.
     """
-    ratio = min(1.0, SIDE / max(camera.width, camera.height))
+    ratio = min(1.0, OUTLINES.side / max(camera.width, camera.height))
     size = max(1, round(camera.width * ratio)), max(1, round(camera.height * ratio))
     mask = silhouette(scene, visible, part, camera.resized(*size))
     found, _ = cv2.findContours(mask.astype(np.uint8), cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
     scale = np.array([camera.width / size[0], camera.height / size[1]])
-    lines = [cv2.approxPolyDP(line, _SMOOTH, True)[:, 0] for line in found if len(line) >= _LEAST]
+    lines = [
+        cv2.approxPolyDP(line, OUTLINES.smooth, True)[:, 0] for line in found if len(line) >= OUTLINES.least
+    ]
     return tuple((line + 0.5) * scale for line in lines if len(line) > 2)
 
 
@@ -58,12 +54,12 @@ def silhouette(
         x, y, z, inside = see(means, viewmat, K, size, NEAR, camera.orthographic)
         depths = 1.0 if camera.orthographic else np.maximum(z, NEAR)
         scales = np.partition(scene.gaussians.scales.detach().cpu().numpy()[rows], 1, axis=1)
-        wide = (scales[:, 1] / depths * K[0, 0]).clip(0, _WIDEST)
+        wide = (scales[:, 1] / depths * K[0, 0]).clip(0, OUTLINES.widest)
     lines, columns = y[inside].astype(int), x[inside].astype(int)
     own, z, steps = part[rows][inside], z[inside], np.round(np.nan_to_num(wide[inside])).astype(int)
     whole = _nearest(z, lines, columns, steps, none.shape)
     some = _nearest(z[own], lines[own], columns[own], steps[own], none.shape)
-    shown = np.isfinite(some) & (some <= _BESIDE * whole)
+    shown = np.isfinite(some) & (some <= OUTLINES.beside * whole)
     closed = cv2.morphologyEx(shown.astype(np.uint8), cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8))
     return cv2.medianBlur(closed, 3) > 0
 
@@ -73,7 +69,7 @@ def _nearest(
 ) -> Float[np.ndarray, "H W"]:
     """Depth of the nearest square at each pixel, endless where there is none."""
     depths = np.full(shape, np.inf, np.float32)
-    for step in range(_WIDEST + 1):
+    for step in range(OUTLINES.widest + 1):
         some = steps == step
         if not some.any():
             continue

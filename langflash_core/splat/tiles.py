@@ -1,9 +1,10 @@
 """The rasteriser for processors: the same sums as the reference, in float32, tile by tile.
 
-A picture is cut into tiles of 8 x 8 pixels. A tile's Gaussians are composited front to back, `_BLOCK` at a
-time and many tiles at once: per block the alphas (B, n, 64), their transmittances by n products, and one
-matrix product with the features. A tile is done when no pixel of it lets more than `STOP` of the light pass,
-which bounds what is left out: |F - F_reference| <= STOP max |f|, beside float32's rounding. Every step is a
+A picture is cut into tiles of 8 x 8 pixels. A tile's Gaussians are composited front to back, `TILES.block` at
+a time and many tiles at once: per block the alphas (B, n, 64), their transmittances by n products, and one
+matrix product with the features. A tile is done when no pixel of it lets more than `TILES.stop` of the light
+pass, which bounds what is left out: |F - F_reference| <= STOP max |f|, beside float32's rounding. Every step
+    is a
 call into torch on a few hundred kilobytes, so it runs beside other threads of Python and can be stopped
 between two of them.
 
@@ -20,17 +21,13 @@ from jaxtyping import Float, Int, Num
 from torch import Tensor
 
 from langflash_core.errors import Cancelled
+from langflash_core.splat.settings import TILES
 from langflash_core.types import Camera
 
 from .projection import ALPHA_MAX, ALPHA_MIN, Footprints
 
-TILE = 8  # pixels a side
-STOP = 1e-4  # transmittance below which a pixel is full
-_BLOCK = 16  # Gaussians of a tile composited at once
-_TILES_AT_ONCE = 256  # 1 MB of alphas a block: within a core's cache
-_PIXELS = TILE * TILE
+_PIXELS = TILES.tile * TILES.tile
 _BELOW_MIN = float(np.nextafter(np.float32(ALPHA_MIN), np.float32(0)))
-_WORTH_PACKING = 0.75  # share of tiles that go on, from which down those that are done are put away
 
 
 def rasterize_tiles(
@@ -73,7 +70,7 @@ def rasterize_tiles(
         with torch.no_grad():
             _composite(table, lists, tiles, images)
 
-    shares = lists.tiles.split(_TILES_AT_ONCE)
+    shares = lists.tiles.split(TILES.tiles_at_once)
     # Each of our threads computes alone: those of torch's own pool would wait for each other at every call.
     before = torch.get_num_threads()
     try:
@@ -89,8 +86,8 @@ def rasterize_tiles(
 def _untiled(image: Tensor, grid: tuple[int, int]) -> Tensor:
     """(tiles, 64, F) to (H, W, F), whole tiles."""
     columns, rows = grid
-    image = image.view(rows, columns, TILE, TILE, -1).permute(0, 2, 1, 3, 4)
-    return image.reshape(rows * TILE, columns * TILE, -1)
+    image = image.view(rows, columns, TILES.tile, TILES.tile, -1).permute(0, 2, 1, 3, 4)
+    return image.reshape(rows * TILES.tile, columns * TILES.tile, -1)
 
 
 @dataclass(frozen=True)
@@ -106,7 +103,7 @@ class _Lists:
 
 
 def tiles_touched(
-    boxes: Num[np.ndarray, "n 4"], width: int, height: int, side: int = TILE
+    boxes: Num[np.ndarray, "n 4"], width: int, height: int, side: int = TILES.tile
 ) -> tuple[Int[np.ndarray, " pairs"], Int[np.ndarray, " pairs"], tuple[int, int]]:
     """Every pair of a box and a tile of side x side pixels of an image that it touches.
 
@@ -189,25 +186,25 @@ class _Table:
 def _composite(table: _Table, lists: _Lists, tiles: Tensor, images: list[Tensor]) -> None:
     """Fill some tiles of the images (tiles, 64, F)."""
     columns = lists.grid[0]
-    offsets = torch.arange(TILE, dtype=torch.float32) + 0.5
-    xs = (tiles % columns * TILE)[:, None] + offsets.repeat(TILE)  # (B, 64)
-    ys = (tiles // columns * TILE)[:, None] + offsets.repeat_interleave(TILE)
+    offsets = torch.arange(TILES.tile, dtype=torch.float32) + 0.5
+    xs = (tiles % columns * TILES.tile)[:, None] + offsets.repeat(TILES.tile)  # (B, 64)
+    ys = (tiles // columns * TILES.tile)[:, None] + offsets.repeat_interleave(TILES.tile)
     starts, counts = lists.starts[tiles], lists.counts[tiles]
     passing = torch.ones(len(tiles), _PIXELS)
     sums = torch.zeros(len(tiles), _PIXELS, table.features.shape[1])
     nobody = len(table.shapes) - 1
     first = 0
     while len(tiles):
-        place = torch.arange(first, first + _BLOCK)
+        place = torch.arange(first, first + TILES.block)
         index = _picked(lists.members, (starts[:, None] + place).clamp_max_(len(lists.members) - 1))
         index.masked_fill_(place >= counts[:, None], nobody)
         weights = _alphas(_picked(table.shapes, index), xs, ys)
-        for i in range(_BLOCK):
+        for i in range(TILES.block):
             passing.sub_(weights[:, i].mul_(passing))  # T alpha; T (1 - alpha) = T - T alpha
         sums.baddbmm_(weights.transpose(1, 2), _picked(table.features, index))
-        first += _BLOCK
-        going = (counts > first) & (passing.amax(1) > STOP)
-        if int(going.sum()) <= _WORTH_PACKING * len(tiles):
+        first += TILES.block
+        going = (counts > first) & (passing.amax(1) > TILES.stop)
+        if int(going.sum()) <= TILES.worth_packing * len(tiles):
             done = ~going
             _put(images, tiles[done], sums[done])
             tiles, xs, ys, starts, counts = (v[going] for v in (tiles, xs, ys, starts, counts))

@@ -45,11 +45,7 @@ from langflash_core.writing.cameras import camera_of
 from langflash_core.writing.encoding import encoded
 from langflash_core.writing.job import Job
 from langflash_core.writing.renderers import Renderer
-
-SECONDS = 6.0
-LONGEST = 600.0  # seconds
-_SWAY = (math.radians(12), math.radians(4))  # yaw and pitch around a single photo: further out are holes
-_MIDDLE = (0.02, 0.98)  # of what is orbited: stray Gaussians do not count
+from langflash_core.writing.settings import FILMING
 
 
 def check_encoder() -> None:
@@ -111,7 +107,7 @@ def way(
         width, height = even(size or scene.view_size)
         views = _poses(scene)
         around = _turn(views[0], shown) if path == "orbit" else None
-        count = max(1, round(RATE * (seconds or SECONDS)))
+        count = max(1, round(RATE * (seconds or FILMING.seconds)))
         turns, up = _turns(scene), _up(scene)
         poses = [
             orbit(around, 2 * math.pi * index / count, 0.0, up)
@@ -199,7 +195,7 @@ def _turns(scene: Scene) -> bool:
 def _turn(view: Pose, shown: Scene) -> Pose:
     """Where an orbit begins: as the first view looks, far enough away to show all that is drawn."""
     means = shown.gaussians.means.detach().double().cpu().numpy()
-    low, high = np.quantile(means[np.isfinite(means).all(1)], _MIDDLE, axis=0)
+    low, high = np.quantile(means[np.isfinite(means).all(1)], FILMING.middle, axis=0)
     return framing(view, Vector(*low.tolist()), Vector(*high.tolist()))
 
 
@@ -214,7 +210,9 @@ def _at(views: list[Pose], time: float, turns: bool, up: Float[np.ndarray, "3"])
         angle = 2 * math.pi * time
         if turns:
             return orbit(views[0], angle, 0.0, up)
-        return orbit(views[0], _SWAY[0] * math.sin(angle), _SWAY[1] * (1 - math.cos(angle)) / 2, up)
+        return orbit(
+            views[0], FILMING.sway[0] * math.sin(angle), FILMING.sway[1] * (1 - math.cos(angle)) / 2, up
+        )
     leg, fraction = divmod(time * len(views), 1.0)
     return blend(views[int(leg)], views[(int(leg) + 1) % len(views)], fraction)
 
@@ -238,13 +236,15 @@ def read_key_frames(path: Path, seconds: float | None) -> tuple[list[Camera], li
         raise ViewError(f"{path}: either all key frames are orthographic, or none")
     times = [entry.get("time") for entry in entries]
     if all(time is None for time in times):
-        return cameras, np.linspace(0, seconds or SECONDS, len(cameras)).tolist()
+        return cameras, np.linspace(0, seconds or FILMING.seconds, len(cameras)).tolist()
     numbers = [
         t for t in times if isinstance(t, int | float) and not isinstance(t, bool) and math.isfinite(t)
     ]
     rising = len(numbers) == len(times) and all(a < b for a, b in itertools.pairwise(numbers))
-    if not rising or numbers[-1] - numbers[0] > LONGEST:
-        raise ViewError(f"{path}: times must rise, all of them given, over at most {LONGEST:g} seconds")
+    if not rising or numbers[-1] - numbers[0] > FILMING.longest:
+        raise ViewError(
+            f"{path}: times must rise, all of them given, over at most {FILMING.longest:g} seconds"
+        )
     if seconds is not None:
         raise ViewError(f"{path} says its times; leave --seconds out")
     return cameras, [number - numbers[0] for number in numbers]

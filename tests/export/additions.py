@@ -1,22 +1,17 @@
 """Splat files with something valid in them that this program need not know: types, elements, flags, versions.
 
-    python -m tests.export.additions [--count 2000] [--seed 0]
-
 The rule: such a file is read to exactly the Gaussians that it had without, or refused in a sentence that
 names what is not known; never to other numbers, and without a warning of numpy. `ADDITIONS` says what is
 added to which file of `files_to_add_to`; another format joins by its rows there.
 """
 
-import argparse
 import gzip
 import io
 import json
 import struct
-import sys
 import tempfile
 import warnings
 import zipfile
-from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
@@ -493,33 +488,3 @@ def outcome(path: Path, expected: Gaussians, words: tuple[str, ...]) -> str:
     for name, values in vars(expected).items():
         assert torch.equal(values, getattr(found, name)), f"{name} are others"
     return "read"
-
-
-def main() -> int:
-    parser = argparse.ArgumentParser(description=str(__doc__).partition("\n")[0])
-    parser.add_argument("--count", type=int, default=2000)
-    parser.add_argument("--seed", type=int, default=0)
-    args = parser.parse_args()
-    found: Counter = Counter()
-    with tempfile.TemporaryDirectory() as folder:
-        files = files_to_add_to(Path(folder))
-        expected = {}
-        for name, content in files.items():
-            (Path(folder) / name).write_bytes(content)
-            expected[name] = read(Path(folder) / name).gaussians
-        whole = [row for row in ADDITIONS if row[0] in files]
-        made = additions(files, whole, args.count, args.seed)
-        for index, (name, content, words) in enumerate(made):
-            path, adds = Path(folder) / name, whole[index % len(whole)][1].__name__
-            path.write_bytes(content)
-            try:
-                found[f"{name} {adds} {outcome(path, expected[name], words)}"] += 1
-            except Exception as error:
-                found[f"{name} {adds} WRONG {type(error).__name__}: {error}"[:150]] += 1
-    for key in sorted(found):
-        sys.stdout.write(f"{found[key]:6} {key}\n")
-    return 1 if any("WRONG" in key for key in found) else 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())

@@ -1,23 +1,16 @@
-"""Damaged files by the thousand: every reader gives something whole or one sentence, and little memory.
-
-Scenes of all formats, language beside a .ply, edits, photos, poses, camera files and key frames.
-
-    python -m tests.export.mutations [--count 10000] [--seed 0]
+"""Small whole files of every kind, their readers, and damage: scenes of all formats, language beside a .ply,
+edits, photos, poses, camera files and key frames.
 
 Bytes are flipped, overwritten with extreme numbers, cut, doubled or mixed with those of another file; a
 packed payload is damaged inside its wrapping too, where checksums would otherwise hide its readers.
+`tests/torture/fuzz.py` does so by the thousand.
 """
 
-import argparse
 import gzip
 import io
 import json
 import struct
-import sys
-import tempfile
-import tracemalloc
 import zipfile
-from collections import Counter
 from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import cache
@@ -199,36 +192,3 @@ def reader_of(path: Path) -> Callable[[], object]:
         return lambda: read_photo(path).image.load()
     scene = path.with_name("spoken.ply") if name.endswith(".language.safetensors") else path
     return lambda: check_scene(read(scene))
-
-
-def main() -> int:
-    parser = argparse.ArgumentParser(description=str(__doc__).partition("\n")[0])
-    parser.add_argument("--count", type=int, default=10_000)
-    parser.add_argument("--seed", type=int, default=0)
-    args = parser.parse_args()
-    found: Counter = Counter()
-    tracemalloc.start()
-    most = 0
-    with tempfile.TemporaryDirectory() as folder:
-        files = whole_files(Path(folder)) | other_files(Path(folder))
-        for index, (name, content) in enumerate(damages(files, args.count, args.seed)):
-            path = Path(folder) / name
-            path.write_bytes(content)
-            tracemalloc.reset_peak()
-            try:
-                found[f"{name} {outcome(path)}"] += 1
-            except Exception as error:
-                found["CRASH"] += 1
-                kept = Path(tempfile.gettempdir()) / f"crash{index}-{name}"
-                kept.write_bytes(content)
-                sys.stdout.write(f"{kept}: {type(error).__name__}: {error}\n")
-            most = max(most, tracemalloc.get_traced_memory()[1])
-            path.write_bytes(files[name])  # others may need it
-    for key in sorted(found):
-        sys.stdout.write(f"{key:32} {found[key]}\n")
-    sys.stdout.write(f"{args.count} files, {found['CRASH']} crashes, at most {most / 1e6:.0f} MB\n")
-    return 1 if found["CRASH"] else 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())

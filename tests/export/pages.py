@@ -11,7 +11,7 @@ import numpy as np
 import torch
 
 from langflash_core.export.packing import from_smallest_three
-from langflash_core.export.page_columns import PLACE_STEPS
+from langflash_core.export.settings import COLUMNS
 from langflash_core.types import Gaussians
 
 
@@ -92,7 +92,7 @@ class ReadPage:
                 parts.append(stored[:count])
                 stored = stored[count:]
                 continue
-            x, y, log = ((places[:count] + layer["lowest"]) / PLACE_STEPS).T
+            x, y, log = ((places[:count] + layer["lowest"]) / COLUMNS.place_steps).T
             places = places[count:]
             fx, fy, cx, cy = view["pinhole"]
             ahead = np.exp(log)

@@ -14,10 +14,10 @@ from langflash_core.base.resources import asset_path
 from langflash_core.errors import InputError, OutputError, PromptError
 from langflash_core.export import export
 from langflash_core.export.html import LAYERED, READING, SCRIPTS, Phrases, write_html
-from langflash_core.export.page_columns import MOST_WEIGHTS
+from langflash_core.export.settings import COLUMNS
 from langflash_core.geometry.poses import Pose, Vector, from_view
-from langflash_core.language.answers import COVERED_ALPHA, MIN_AREA, TOP_FRACTION
-from langflash_core.language.relevance import EMPTY_NORM, compile_query
+from langflash_core.language.relevance import compile_query
+from langflash_core.language.settings import ANSWERING, RELEVANCE
 from langflash_core.language.spaces import language_space
 from langflash_core.language.vocabulary import all_phrases
 from langflash_core.scene.bare import bare_scene
@@ -41,6 +41,12 @@ ODD = (
 @pytest.fixture(scope="module")
 def spoken_room() -> Scene:
     return room(language_space("minilm").encode(PHRASES))
+
+
+@pytest.fixture
+def few(monkeypatch) -> None:
+    """A vocabulary that takes no seconds to encode."""
+    monkeypatch.setattr(pipeline, "all_phrases", lambda: PHRASES)
 
 
 def phrases_of(scene: Scene, texts: tuple[str, ...]) -> Phrases:
@@ -157,7 +163,7 @@ def test_only_the_largest_weights_are_kept(tmp_path):
     scene = cloud(40, num_atoms=9, kept=8, degree=0, dtype=torch.float32)
     write_html(scene, tmp_path / "a.html", phrases=phrases_of(scene, ("one",)))
     found = read_page(tmp_path / "a.html").dense_weights()
-    assert ((found > 0).sum(1) <= MOST_WEIGHTS).all() and np.allclose(found.sum(1), 1)
+    assert ((found > 0).sum(1) <= COLUMNS.most_weights).all() and np.allclose(found.sum(1), 1)
 
 
 def test_a_page_scores_phrases_as_a_query_does(tmp_path, spoken_room):
@@ -175,7 +181,7 @@ def test_a_page_scores_phrases_as_a_query_does(tmp_path, spoken_room):
     assert page.header["phrases"]["temperature"] == compiled.temperature
 
 
-def test_bad_questions_are_one_sentence(tmp_path, spoken_room):
+def test_bad_questions_are_one_sentence(tmp_path, spoken_room, few):
     plain = bare_scene(random_gaussians(3), "made")
     with pytest.raises(PromptError, match="no language"):
         pipeline.web_page(plain, tmp_path / "a.html", ["chair"])
@@ -186,7 +192,7 @@ def test_bad_questions_are_one_sentence(tmp_path, spoken_room):
     assert "phrases" not in read_page(tmp_path / "a.html").header
 
 
-def test_a_page_takes_the_text_model_along(tmp_path, spoken_room):
+def test_a_page_takes_the_text_model_along(tmp_path, spoken_room, few):
     pipeline.web_page(spoken_room, tmp_path / "a.html", with_text=True)
     page = read_page(tmp_path / "a.html")
     assert np.allclose(page.dictionary(), spoken_room.semantics.dictionary.numpy(), atol=1e-4)
@@ -220,13 +226,13 @@ def test_the_page_judges_by_our_numbers():
     text = "".join((PAGE / name).read_text(encoding="utf-8") for name in ("answers.js", "sorting.js"))
     said = {name: float(value) for name, value in re.findall(r"const (\w+) = ([\d.e-]+);", text)}
     ours = {
-        "EMPTY_NORM": EMPTY_NORM, "COVERED_ALPHA": COVERED_ALPHA, "TOP_FRACTION": TOP_FRACTION,
-        "MIN_AREA": MIN_AREA, "NEAR": NEAR,
+        "EMPTY_NORM": RELEVANCE.empty_norm, "COVERED_ALPHA": ANSWERING.covered_alpha,
+        "TOP_FRACTION": ANSWERING.top_fraction, "MIN_AREA": ANSWERING.min_area, "NEAR": NEAR,
     }  # fmt: skip
     assert {name: said[name] for name in ours} == ours
 
 
-def test_stops_and_notes_come_along(tmp_path, spoken_room):
+def test_stops_and_notes_come_along(tmp_path, spoken_room, few):
     """A stop of another lens or of parallel rays shows its subject as large."""
     wide = replace(pose_of(spoken_room), fov=90.0)
     flat = replace(pose_of(spoken_room), span=2.0, reach=5.0)
@@ -254,7 +260,7 @@ def pose_of(scene: Scene) -> Pose:
     return from_view(scene.viewmats[0].numpy(), scene.Ks[0].numpy(), scene.view_size, 1.2)
 
 
-def test_a_page_of_several_scenes_asks_all_the_same(tmp_path, spoken_room):
+def test_a_page_of_several_scenes_asks_all_the_same(tmp_path, spoken_room, few):
     fewer = spoken_room.rows(torch.arange(3000))
     pipeline.web_page(spoken_room, tmp_path / "a.html", ["lamp"], beside={"the other": fewer})
     first, second = (read_page(tmp_path / "a.html", number) for number in (0, 1))

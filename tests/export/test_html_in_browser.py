@@ -16,18 +16,17 @@ from torch.nn.functional import normalize
 
 import langflash_core as lf
 from langflash_core import pipeline
-from langflash_core.base.resources import asset_path
 from langflash_core.export.html import write_html
 from langflash_core.export.png import heat_over
 from langflash_core.language.algebra import encode_prompts
-from langflash_core.language.answers import COVERED_ALPHA
+from langflash_core.language.settings import ANSWERING
 from langflash_core.language.spaces import language_space
 from langflash_core.scene.bare import bare_scene
 from langflash_core.scene.exposure import lit_camera
 from langflash_core.splat import render
 from langflash_core.types import QueryResult, Scene
 from tests.app.window.scenes import CHAIR, PHRASES, room
-from tests.export.browser import Browser, browser, needs_browser
+from tests.export.browser import Browser, needs_browser
 from tests.export.splats import random_gaussians
 from tests.export.test_html import ODD, PAGE, phrases_of
 from tests.splat.scenes import cloud
@@ -94,7 +93,7 @@ def check_answer(page: Browser, ours: QueryResult, view: int) -> None:
     assert theirs.score == pytest.approx(answer.score, abs=0.01)
     if answer.found:
         assert theirs.relevance is not None
-        mask = (theirs.relevance >= answer.threshold) & (theirs.alpha >= COVERED_ALPHA)
+        mask = (theirs.relevance >= answer.threshold) & (theirs.alpha >= ANSWERING.covered_alpha)
         expected = ours.masks[0].numpy()
         assert (mask & expected).sum() / (mask | expected).sum() >= LEAST_IOU
 
@@ -110,12 +109,6 @@ def until(page: Browser, expression: str, seconds: float = 90) -> None:
     while not page.value(expression):
         assert time.monotonic() < deadline, f"never true: {expression}"
         time.sleep(0.1)
-
-
-@pytest.fixture(scope="module")
-def page(tmp_path_factory):
-    with browser(tmp_path_factory.mktemp("browser") / "profile") as opened:
-        yield opened
 
 
 @pytest.fixture(scope="module")
@@ -327,23 +320,6 @@ def test_a_browser_without_webgl_says_so(page, file):
         until(page, "document.getElementById('waiting').textContent.includes('no WebGL 2')")
     finally:
         page.call("Page.removeScriptToEvaluateOnNewDocument", identifier=added)
-
-
-@pytest.mark.slow
-def test_the_demo_room(page, tmp_path):
-    """Trained weights on shipped photos: answers, the file's size, and when there is a picture."""
-    photos = [asset_path(f"photos/living_room_{side}.png") for side in ("left", "right")]
-    trained = lf.reconstruct(photos)
-    path = tmp_path / "room.html"
-    pipeline.web_page(trained, path, ["plant", "piano"])
-    assert path.stat().st_size < 20 * len(trained.gaussians)
-    page.open(path, trained.view_size)
-    assert page.value(_READY) < 60_000  # milliseconds to the first picture, drawn in software
-    until(page, "document.querySelectorAll('[data-state=pending]').length === 0")
-    states = page.value("[...document.querySelectorAll('.chip')].map((chip) => chip.dataset.state)")
-    assert states == ["found", "missing"]
-    check_answer(page, lf.query(trained, "plant", view=0), 0)
-    assert page.errors == []
 
 
 PHRASES_OF_ALL_KINDS = (

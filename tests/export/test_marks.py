@@ -333,12 +333,11 @@ def test_a_floor_above_everything_stands_on_its_head(tmp_path, sheets, expected)
         assert read(written(tmp_path, gaussians)).record.warnings == ()
 
 
-def test_scenes_that_stand_are_not_said_to_hang(tmp_path):
+def test_scenes_that_stand_are_not_said_to_hang():
     fixtures = Path(__file__).parents[1] / "fixtures" / "scenes"
-    scenes = [box_room(), box_room(pitch=0), box_room(pitch=-10), stripes(), made()]
+    scenes = [box_room(), box_room(pitch=-10), stripes(), made()]
     for scene in [*scenes, *map(read, sorted(fixtures.glob("*.langflash")))]:
-        export(scene, tmp_path / "a.spz")
-        assert read(tmp_path / "a.spz").record.warnings == ((SAID,) if scene.record.antialiased else ())
+        assert not on_its_head(scene.gaussians)
 
 
 def test_nothing_that_is_seen_hangs_nowhere():

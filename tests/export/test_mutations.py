@@ -16,19 +16,14 @@ from langflash_core.errors import SceneFileError
 from langflash_core.export import read
 from tests.export.additions import ADDITIONS, additions, axes_file, files_to_add_to, ply_of, spz_axes
 from tests.export.additions import outcome as outcome_of_addition
-from tests.export.mutations import damages, other_files, outcome, whole_files
+from tests.export.mutations import damages, outcome, whole_files
 
 ROOM = 8 * 2**20  # bytes that any reader may take, beside twice what the file says it holds
 
 
 @pytest.fixture(scope="module")
-def folder(tmp_path_factory) -> Path:
-    return tmp_path_factory.mktemp("whole")
-
-
-@pytest.fixture(scope="module")
-def files(folder) -> dict[str, bytes]:
-    return whole_files(folder)
+def files(tmp_path_factory) -> dict[str, bytes]:
+    return whole_files(tmp_path_factory.mktemp("whole"))
 
 
 def refused(path: Path) -> tuple[str, int]:
@@ -42,15 +37,13 @@ def refused(path: Path) -> tuple[str, int]:
         tracemalloc.stop()
 
 
-@pytest.mark.parametrize("kind", ["splats", "others"])
-def test_mutated_files_are_read_or_refused(files, folder, kind):
-    """A sample of 440 and more; `python -m tests.export.mutations` makes thousands."""
-    whole = files if kind == "splats" else other_files(folder)
+def test_mutated_splats_are_read_or_refused(files, tmp_path):
+    """What else is read is damaged by `tests/torture`, and splats by the thousand."""
     found = set()
-    for name, content in damages(whole, 20 * len(whole), seed=7):
-        (folder / name).write_bytes(content)
-        found.add(outcome(folder / name))
-        (folder / name).write_bytes(whole[name])
+    for name, content in damages(files, 20 * len(files), seed=7):
+        (tmp_path / name).write_bytes(content)
+        found.add(outcome(tmp_path / name))
+        (tmp_path / name).write_bytes(files[name])
     assert found == {"read", "refused"}
 
 
@@ -188,7 +181,7 @@ def addable(tmp_path_factory) -> tuple[Path, dict[str, bytes], dict]:
 
 @pytest.mark.parametrize("kind", sorted({kind for kind, _ in ADDITIONS}))
 def test_what_is_not_known_changes_nothing_or_is_refused_by_name(addable, kind):
-    """Six of every addition; `python -m tests.export.additions` makes thousands."""
+    """Six of every addition."""
     folder, files, expected = addable
     if kind not in files:
         pytest.skip("needs a package that is not installed")

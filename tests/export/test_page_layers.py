@@ -14,7 +14,7 @@ import torch
 from app.gl.layered import MOVING
 from langflash_core import pipeline
 from langflash_core.export.html import write_html
-from langflash_core.export.page_columns import PLACE_STEPS
+from langflash_core.export.settings import COLUMNS
 from langflash_core.geometry.cameras import transform
 from langflash_core.geometry.nearness import FLOOR, NEAREST, Nearness
 from langflash_core.splat import compose
@@ -69,7 +69,8 @@ def test_layers_come_back_within_the_steps_of_their_photos(tmp_path):
         )
         # half a step each; and float32 of what the page gives, 1e-6 of the place, 40 pixels a unit and more
         assert (
-            float(apart[0]) <= 0.5 / PLACE_STEPS[0] + 1e-3 and float(apart[1]) <= 0.5 / PLACE_STEPS[2] + 1e-5
+            float(apart[0]) <= 0.5 / COLUMNS.place_steps[0] + 1e-3
+            and float(apart[1]) <= 0.5 / COLUMNS.place_steps[2] + 1e-5
         )
     unowned = ids < 0
     assert int(unowned.sum()) == 40
@@ -162,7 +163,7 @@ def test_the_page_blends_by_our_numbers():
     said = {name: float(value) for name, value in re.findall(r"const (\w+) = ([\d.e-]+);", text)}
     ours = {"NEAREST": NEAREST, "FLOOR": FLOOR, "DEPTH": compose.DEPTH, "MOVING": MOVING}
     assert {name: said[name] for name in ours} == ours
-    assert f"PLACE_STEPS = {list(PLACE_STEPS)};" in text
+    assert f"PLACE_STEPS = {list(COLUMNS.place_steps)};" in text
 
 
 def test_layers_that_nobody_owns_are_one_surface(tmp_path):

@@ -6,7 +6,8 @@ from PIL import Image
 
 from langflash_core.export import paint
 from langflash_core.export.colours import heat, label_colours
-from langflash_core.export.png import LABEL_OPACITY, label_picture
+from langflash_core.export.png import label_picture
+from langflash_core.export.settings import PAINTING
 from langflash_core.types import Camera, Frame, PromptAnswer, QueryResult
 
 
@@ -51,7 +52,7 @@ def test_labels_take_the_best_phrase_that_is_present():
     camera = Camera(torch.eye(4), torch.eye(3), 3, 1)
     result = QueryResult(answers, "relevancy", relevance, relevance >= 0.5, black, camera)
     picture = label_picture(result).astype(int)
-    assert np.abs(picture[0, :2] - LABEL_OPACITY * label_colours(2)).max() <= 1  # rounding
+    assert np.abs(picture[0, :2] - PAINTING.label_opacity * label_colours(2)).max() <= 1  # rounding
     assert not picture[0, 2].any()  # nothing present
 
 

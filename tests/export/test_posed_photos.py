@@ -12,7 +12,8 @@ from PIL import Image
 
 from langflash_core.errors import InputError, SceneFileError
 from langflash_core.export import export
-from langflash_core.export.cameras import MOST_POINTS, read_posed
+from langflash_core.export.cameras import read_posed
+from langflash_core.export.settings import POINT_CLOUD
 from langflash_core.geometry.cameras import MIRRORED, turned_camera
 from langflash_core.images.decode import read_photo
 from langflash_core.images.views import load_views
@@ -298,7 +299,7 @@ def test_what_is_written_begins_in_every_trainer(tmp_path, scene, monkeypatch):
     monkeypatch.setattr("langflash_core.export.cameras.MOST_POINTS", 2)
     export(scene, tmp_path / "cameras.txt")
     assert 1 <= len((tmp_path / "points3D.txt").read_text().splitlines()) - 1 <= 2
-    assert MOST_POINTS >= 10_000 and len(random_gaussians(5)) == len(scene.gaussians)
+    assert POINT_CLOUD.most_points >= 10_000 and len(random_gaussians(5)) == len(scene.gaussians)
 
 
 def test_texts_in_other_encodings_are_refused_in_one_sentence(tmp_path):

@@ -19,19 +19,13 @@ from langflash_core.scene.tour import Note, Stop, Tour, told_tour
 from langflash_core.showing.notebook import Cell, camera_from, page_of
 from langflash_core.types import Gaussians, Scene
 from tests.app.window.scenes import CHAIR, PHRASES, room
-from tests.export.browser import Browser, browser, needs_browser
+from tests.export.browser import Browser, needs_browser
 from tests.export.test_html_in_browser import _READY, place, until
 
 pytestmark = needs_browser
 GUIDE = Path(__file__).resolve().parents[2] / "GUIDE.md"
 FRONT = Vector(CHAIR[0], CHAIR[1], CHAIR[2] - 0.2)
 BEHIND = Vector(CHAIR[0], CHAIR[1], 1.3)  # on the wall
-
-
-@pytest.fixture(scope="module")
-def page(tmp_path_factory):
-    with browser(tmp_path_factory.mktemp("browser") / "profile") as opened:
-        yield opened
 
 
 @pytest.fixture(scope="module")

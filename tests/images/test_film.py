@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from langflash_core.errors import Cancelled, FilmError
-from langflash_core.images.film import LOOKS, opened
+from langflash_core.images.film import opened
+from langflash_core.images.settings import LOOKING
 from tests import films
 
 FIRST = films.seen(0.0)
@@ -55,7 +56,7 @@ def test_times_are_those_of_the_film(film: Path) -> None:
 
 def test_of_many_frames_a_second_some_are_looked_at(tmp_path: Path) -> None:
     path = films.write(tmp_path / "fast.mp4", films.walk(60, 2.0), 60)
-    assert len(read(path)) == pytest.approx(LOOKS, abs=1)
+    assert len(read(path)) == pytest.approx(LOOKING.looks, abs=1)
 
 
 def test_ten_bits_of_hevc_are_read(film: Path) -> None:
@@ -112,9 +113,9 @@ def fields(film: Path) -> Path:
 def test_interlaced_pictures_are_taken_apart(fields: Path, codec: tuple[str, ...], suffix: str) -> None:
     path = films.interlaced(fields, fields.with_name(f"interlaced{suffix}"), *codec)
     pictures = read(path)
-    assert len(pictures) == pytest.approx(2.0 * LOOKS, abs=1)
+    assert len(pictures) == pytest.approx(2.0 * LOOKING.looks, abs=1)
     part = read(path, 0.8, 1.4)
-    assert part[0][0] == pytest.approx(0.8) and 1.4 - 1 / LOOKS < part[-1][0] <= 1.4 + 1e-6
+    assert part[0][0] == pytest.approx(0.8) and 1.4 - 1 / LOOKING.looks < part[-1][0] <= 1.4 + 1e-6
     for seconds, picture in (*pictures[::7], *part[::7]):  # of its two moments the first
         assert alike(picture, films.seen(3.0 * round(50 * seconds))), seconds
 

@@ -11,6 +11,7 @@ from langflash_core.errors import Cancelled, FilmError
 from langflash_core.images import frames
 from langflash_core.images.film import Reader
 from langflash_core.images.frames import remaining, strip_of
+from langflash_core.images.settings import STILLS
 from langflash_core.images.strip import Choice, Strip, choose, notes_on
 from tests import films
 
@@ -69,7 +70,7 @@ def test_a_hand_that_sways_goes_nowhere(tmp_path: Path) -> None:
         tmp_path / "hand.mp4", [films.seen(60 + x, 100 + y) for x, y in zip(*ways, strict=True)]
     )
     strip, choice = chosen(path)
-    assert strip.stills[-1].place - strip.stills[0].place < frames.RULER and len(choice.chosen) <= 3
+    assert strip.stills[-1].place - strip.stills[0].place < STILLS.ruler and len(choice.chosen) <= 3
 
 
 def passed(share: float) -> np.ndarray:
@@ -226,7 +227,7 @@ def test_nothing_is_decoded_twice(tmp_path: Path, home: Path, monkeypatch) -> No
 
 
 def test_only_the_last_films_are_kept(tmp_path: Path, home: Path, monkeypatch) -> None:
-    monkeypatch.setattr(frames, "KEPT_FILMS", 2)
+    monkeypatch.setattr(frames, "STILLS", replace(frames.STILLS, kept_films=2))
     for name in ("a", "b", "c"):
         last = strip_of(films.write(tmp_path / f"{name}.mp4", films.walk(8)))
     assert len(list((home / "films").iterdir())) == 2 and last.folder.is_dir()
@@ -247,7 +248,7 @@ def test_whoever_stops_it_leaves_nothing(tmp_path: Path, home: Path) -> None:
 def test_a_long_film_keeps_a_bounded_number(tmp_path: Path, monkeypatch) -> None:
     path = films.write(tmp_path / "walk.mp4", films.walk(90))
     many = strip_of(path)
-    monkeypatch.setattr(frames, "MOST_STILLS", 10)
+    monkeypatch.setattr(frames, "STILLS", replace(frames.STILLS, most_stills=10))
     few = strip_of(path, start=1e-9)  # another key of the cache
     assert len(few.stills) <= 10 < len(many.stills) and few.looked == many.looked
     assert len(list(few.folder.glob("*.jpg"))) == len(few.stills)
@@ -255,7 +256,7 @@ def test_a_long_film_keeps_a_bounded_number(tmp_path: Path, monkeypatch) -> None
 
 
 def test_large_pictures_are_kept_smaller(tmp_path: Path, monkeypatch) -> None:
-    monkeypatch.setattr(frames, "STILL_SIDE", 160)
+    monkeypatch.setattr(frames, "STILLS", replace(frames.STILLS, still_side=160))
     strip = strip_of(films.write(tmp_path / "walk.mp4", films.walk(20)))
     kept = cv2.imread(str(strip.path(0)))
     assert kept is not None and kept.shape == (120, 160, 3)

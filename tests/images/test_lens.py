@@ -8,7 +8,8 @@ import torch
 from langflash_core.errors import InputError
 from langflash_core.geometry.cameras import fov_degrees
 from langflash_core.images.decode import read_photo
-from langflash_core.images.lens import ASSUMED_FOV, check_lens, exif_focal, known_lenses, photo_intrinsics
+from langflash_core.images.lens import check_lens, exif_focal, known_lenses, photo_intrinsics
+from langflash_core.images.settings import LENS_PRIOR
 from langflash_core.types import FoundFocal, Lenses
 from tests.images.pictures import exif, room_picture, saved
 
@@ -88,7 +89,7 @@ def test_photos_of_one_camera_share_a_lens(tmp_path):
     photos = [plain, turned, smaller, recorded, recorded]
     lenses = known_lenses(photos, [None] * 5, None, "assumed")
     assert lenses is not None and lenses.of == (0, 0, 1, 2, 2)
-    assert lenses.fovs == pytest.approx([ASSUMED_FOV, ASSUMED_FOV, 67.3], abs=0.1)
+    assert lenses.fovs == pytest.approx([LENS_PRIOR.assumed_fov, LENS_PRIOR.assumed_fov, 67.3], abs=0.1)
     assert lenses.recorded == (False, False, True) and lenses.doubts[0] > 10 * lenses.doubts[2] > 0
     given = known_lenses(photos, [None, 70.0, None, None, None], None, "")
     assert given is not None and given.doubts[given.of[1]] == 0 and given.fovs[given.of[1]] == 70

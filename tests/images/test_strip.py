@@ -9,6 +9,7 @@ import pytest
 from langflash_core.errors import FilmError
 from langflash_core.images import strip as module
 from langflash_core.images.pictures import photo_names
+from langflash_core.images.settings import CHOOSING, PHOTO_LIMITS
 from langflash_core.images.still_names import is_still, shown_name, still_name
 from langflash_core.images.strip import Still, Strip, choose, read_strip, written
 
@@ -32,8 +33,8 @@ def test_the_choice_is_the_best_of_all(seed: int) -> None:
     def value(chosen: tuple[int, ...]) -> float:
         ratios = np.diff(places[list(chosen)]) / spacing
         ends = [(places[chosen[0]] - places[0]) / spacing, (places[-1] - places[chosen[-1]]) / spacing]
-        cost = module._UNEVEN * (((ratios - 1) ** 2).sum() + np.square(ends).sum())
-        return worth[list(chosen)].sum() - cost - 10.0 * (ratios < module.NARROWEST).sum()
+        cost = CHOOSING.uneven * (((ratios - 1) ** 2).sum() + np.square(ends).sum())
+        return worth[list(chosen)].sum() - cost - 10.0 * (ratios < CHOOSING.narrowest).sum()
 
     found = tuple(module._best(places, worth, count).tolist())
     best = max(itertools.combinations(range(9), count), key=value)
@@ -42,10 +43,10 @@ def test_the_choice_is_the_best_of_all(seed: int) -> None:
 
 def test_stills_of_elsewhere_and_repeats_take_no_room() -> None:
     reasons = ["", "", "", *["repeat"] * 20, "", "", ""]
-    places = module.SPACING * np.arange(26)
+    places = CHOOSING.spacing * np.arange(26)
     choice = choose(strip(places, np.ones(26), reasons), 32)
     assert set(choice.chosen) <= {0, 1, 2, 23, 24, 25} and choice.left["repeats"] == 20
-    assert choice.gap < 1.5 * module.SPACING, "and not the twenty that lie between"
+    assert choice.gap < 1.5 * CHOOSING.spacing, "and not the twenty that lie between"
 
 
 def test_a_film_without_a_way_is_refused() -> None:
@@ -82,10 +83,14 @@ def test_an_index_that_is_not_whole_is_none(tmp_path: Path) -> None:
 def test_of_a_way_too_long_for_one_scene_the_begin_is_taken() -> None:
     places = np.linspace(0, 40, 401)
     long = strip(places, np.ones(401))
-    choice = choose(long, module.FILM_PHOTOS)
-    assert len(choice.chosen) == module.FILM_PHOTOS and choice.gap < 0.7
-    more = choose(long, 2 * module.FILM_PHOTOS)
-    assert len(more.chosen) == 2 * module.FILM_PHOTOS and more.until is not None and choice.until is not None
+    choice = choose(long, PHOTO_LIMITS.film_photos)
+    assert len(choice.chosen) == PHOTO_LIMITS.film_photos and choice.gap < 0.7
+    more = choose(long, 2 * PHOTO_LIMITS.film_photos)
+    assert (
+        len(more.chosen) == 2 * PHOTO_LIMITS.film_photos
+        and more.until is not None
+        and choice.until is not None
+    )
     assert more.until > 1.9 * choice.until
     assert choice.until is not None and choice.left["beyond"] == sum(
         s.seconds > choice.until for s in long.stills

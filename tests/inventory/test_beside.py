@@ -11,6 +11,7 @@ from langflash_core.errors import InputError
 from langflash_core.inventory import alignment, beside, inventory
 from langflash_core.inventory.alignment import Fit
 from langflash_core.inventory.beside import difference
+from langflash_core.inventory.settings import ALIGNMENT
 from langflash_core.language.spaces import language_space
 from langflash_core.splat import render
 from tests.boxroom import CHAIRS, METRES, TABLE, WORDS, box_room
@@ -39,7 +40,7 @@ def test_the_turn_scale_and_shift_of_matches_are_found_among_wrong_ones():
 def test_matches_that_agree_on_nothing_are_no_fit():
     rng = np.random.default_rng(1)
     fit = alignment._fitted(rng.uniform(-2, 2, (30, 3)), rng.uniform(-2, 2, (30, 3)), 1.0)
-    assert fit is None or fit.matches < alignment._LEAST
+    assert fit is None or fit.matches < ALIGNMENT.least
     assert alignment._fitted(np.zeros((1, 3)), np.zeros((1, 3)), 1.0) is None
 
 

@@ -9,7 +9,8 @@ from langflash_core.geometry.harmonics import SH_C0
 from langflash_core.inventory import beside, inventory
 from langflash_core.inventory.alignment import Fit
 from langflash_core.inventory.beside import difference
-from langflash_core.inventory.gone import LEAST, changes, fate
+from langflash_core.inventory.gone import changes, fate
+from langflash_core.inventory.settings import GONE
 from langflash_core.language.spaces import language_space
 from langflash_core.splat import render
 from tests.boxroom import METRES, TABLE, WORDS, box_room
@@ -40,7 +41,7 @@ def test_what_another_scene_lacks_has_gone_and_nothing_else_has(room):
     assert (fates.gone & table).sum() >= 0.5 * (fates.known & table).sum() > 0
     assert (fates.gone & ~table).sum() <= 0.01 * (~table).sum()
     (rows,) = changes(room, fates.gone)
-    assert table[rows].mean() >= 0.95 and room.shares[:, rows].sum(1).max() >= LEAST
+    assert table[rows].mean() >= 0.95 and room.shares[:, rows].sum(1).max() >= GONE.least
 
 
 def test_the_same_things_at_depths_off_by_a_tenth_have_not_gone(room):

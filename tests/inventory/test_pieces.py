@@ -3,7 +3,8 @@
 import numpy as np
 import pytest
 
-from langflash_core.inventory.pieces import CONTACT, STRUCTURE, Pieces, parts_of_room
+from langflash_core.inventory.pieces import STRUCTURE, Pieces, parts_of_room
+from langflash_core.inventory.settings import PRESENCE
 from langflash_core.language.vocabulary import OWN
 from langflash_core.segments import photo_shares
 from tests.boxroom import box_room
@@ -85,7 +86,7 @@ def offer(groups, one, other, masses, means, pairs) -> tuple[float, float]:
 
     borders = [sum(contact(g, rest) for rest in groups if rest != g) for g in (one, other)]
     touch = contact(one, other)
-    if not touch or touch < CONTACT * min(borders):
+    if not touch or touch < PRESENCE.contact * min(borders):
         return 1.0, 0.0
     a, b, both = mean(one), mean(other), mean(one | other)
     first, second = masses[sorted(one)].sum(), masses[sorted(other)].sum()

@@ -1,11 +1,11 @@
+"""One thread: these tensors are small, and timings would depend on how many there are."""
+
 import pytest
-import torch
+
+from tests.torch_threads import torch_threads
 
 
 @pytest.fixture(autouse=True)
 def one_thread():
-    """Small tensors: threads only get in each other's way, and timings would depend on their number."""
-    before = torch.get_num_threads()
-    torch.set_num_threads(1)
-    yield
-    torch.set_num_threads(before)
+    with torch_threads(1):
+        yield

@@ -1,11 +1,13 @@
 """Relevance of single Gaussians, against their features formed one by one."""
 
+from dataclasses import replace
+
 import numpy as np
 import torch
 from torch.nn.functional import normalize
 
 from langflash_core.language import gaussians
-from langflash_core.language.gaussians import gaussian_relevance
+from langflash_core.language.gaussians import answering_shares, gaussian_relevance, photos_that_answer
 from langflash_core.language.relevance import compile_query, rivalled
 from langflash_core.language.spaces import language_space
 from langflash_core.types import Gaussians, Scene, Semantics
@@ -60,3 +62,24 @@ def test_it_is_the_relevancy_of_each_feature(monkeypatch):
             least = min(softmax / (softmax + np.exp(compiled.temperature * other)) for other in others)
             # float32 cosines are good to 1e-6, and relevancy moves by a quarter of temperature times that.
             assert abs(found[phrase, row] - least) < 1e-5
+
+
+def test_which_photo_answers_is_counted_among_its_own_gaussians():
+    """Photos 1 and 2 of three have Gaussians; of some no photo is known."""
+    scene = mixed_scene()
+    ids = torch.arange(200) % 3 - 1
+    scene = replace(
+        scene, viewmats=torch.eye(4).repeat(3, 1, 1), Ks=torch.eye(3).repeat(3, 1, 1), view_ids=ids
+    )
+    compiled = compile_query(scene, language_space("minilm"), ["chair", "submarine"])
+    there = torch.arange(200) % 5 > 0
+    hits = gaussian_relevance(scene.semantics, compiled) >= compiled.threshold
+    some = [there & (ids == view) for view in (0, 1, 2, -1)]
+    expected = [[float(hit[own].float().mean()) if own.any() else 0.0 for own in some] for hit in hits]
+    shares = answering_shares(scene, compiled, there)
+    np.testing.assert_allclose(shares.numpy(), expected, rtol=1e-6)  # of float32
+    best = max((0, 1), key=lambda view: expected[0][view])
+    assert photos_that_answer(shares) == (best, None) and expected[0][best] > 0
+    unknown = answering_shares(replace(scene, view_ids=None), compiled)
+    assert unknown.shape == (2, 4) and not unknown[:, :3].any() and unknown[0, 3] > 0
+    assert photos_that_answer(unknown) == (None, None)

@@ -7,8 +7,6 @@ import pytest
 
 from langflash_core.errors import PromptError
 from langflash_core.language.lessons import (
-    MOST_LESSONS,
-    SAME,
     Lesson,
     Lessons,
     fitting,
@@ -17,6 +15,7 @@ from langflash_core.language.lessons import (
     with_lessons,
     write_lessons,
 )
+from langflash_core.language.settings import LESSON_LIMITS
 from langflash_core.types import Record
 
 RNG = np.random.default_rng(0)
@@ -49,7 +48,9 @@ def test_what_was_taught_is_kept_and_what_no_photo_shows_is_not():
     assert len(lessons_of(TAUGHT, unseen, "net")) == 1
 
 
-@pytest.mark.parametrize("cosine, takes", [(SAME + 0.01, True), (SAME - 0.01, False)])
+@pytest.mark.parametrize(
+    "cosine, takes", [(LESSON_LIMITS.same + 0.01, True), (LESSON_LIMITS.same - 0.01, False)]
+)
 def test_a_group_that_looks_so_takes_the_lesson(cosine, takes):
     lessons = lessons_of(TAUGHT, VECTORS, "net")
     rows = np.stack([beside(VECTORS[0], cosine), unit(384)])
@@ -103,7 +104,7 @@ def test_vectors_of_other_weights_are_refused():
         {"lessons": [{"vector": np.ones(4, "<f4").tobytes().hex()}]},
         {"lessons": [{"vector": unit(4).tobytes().hex(), "name": 3}]},
         {"lessons": [{"vector": unit(4).tobytes().hex()}, {"vector": unit(5).tobytes().hex()}]},
-        {"lessons": [{}] * (MOST_LESSONS + 1)},
+        {"lessons": [{}] * (LESSON_LIMITS.most_lessons + 1)},
         {"network": None},
     ],
 )
@@ -117,6 +118,6 @@ def test_what_is_no_vocabulary_is_one_sentence(tmp_path, change):
 
 
 def test_too_many_are_refused():
-    many = Lessons("net", tuple(Lesson(row) for row in unit(MOST_LESSONS, 64)))
+    many = Lessons("net", tuple(Lesson(row) for row in unit(LESSON_LIMITS.most_lessons, 64)))
     with pytest.raises(PromptError, match="at most"):
         many.joined(Lessons("net", (Lesson(unit(64), "one more"),)))

@@ -6,7 +6,8 @@ from safetensors.torch import load_file, save_file
 
 from langflash_core.base.resources import asset_path
 from langflash_core.errors import PromptError, WeightsError
-from langflash_core.language.minilm import MAX_TOKENS, load_minilm, read_minilm
+from langflash_core.language.minilm import load_minilm, read_minilm
+from langflash_core.language.settings import MINILM
 from tests.language.reference import bert_twin
 
 WEIGHTS = "weights/minilm_l6_v2_rowint8.safetensors"
@@ -85,7 +86,7 @@ def test_unicode(tower):
 
 def test_long_prompts_are_cut_at_the_models_maximum(tower):
     long = "chair " * 300
-    assert len(tower.tokens(long)) == MAX_TOKENS
+    assert len(tower.tokens(long)) == MINILM.max_tokens
     torch.testing.assert_close(tower.encode([long]), tower.encode([long + "and a lamp"]), rtol=0, atol=0)
 
 

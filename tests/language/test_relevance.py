@@ -9,7 +9,6 @@ from torch.nn.functional import normalize
 
 from langflash_core.errors import PromptError, SceneFileError
 from langflash_core.language.relevance import (
-    EMPTY_NORM,
     CompiledQuery,
     Mode,
     compile_query,
@@ -18,6 +17,7 @@ from langflash_core.language.relevance import (
     relevance_maps,
     relevancy,
 )
+from langflash_core.language.settings import RELEVANCE
 from langflash_core.language.spaces import language_space
 from langflash_core.types import Gaussians, Record, Scene, Semantics
 from tests.language.reference import feature_cosine, gram_cosine, softmax_relevancy
@@ -143,7 +143,7 @@ def test_empty_pixels_are_exactly_zero(mode, num):
     texts, negatives = atoms(3, seed=2), atoms(2, seed=3) if mode == "relevancy" else None
     query = compiled(atoms(num), texts, negatives, mode=mode)
     weights = maps(num)
-    weights[1] *= EMPTY_NORM * 0.5  # barely touched pixels count as empty, too
+    weights[1] *= RELEVANCE.empty_norm * 0.5  # barely touched pixels count as empty, too
     scores = relevance_maps(weights, query)
     assert scores.shape == (3, 9, 11)
     assert torch.isfinite(scores).all()

@@ -13,7 +13,8 @@ from langflash_core.language.relevance import (
     relevance_maps,
     rivalled,
 )
-from langflash_core.language.rivals import BEHIND, KIN, LEAD, alike, rivalry
+from langflash_core.language.rivals import alike, rivalry
+from langflash_core.language.settings import RIVALS
 from langflash_core.language.spaces import language_space
 from langflash_core.types import Semantics
 from tests.language.reference import beaten_twin
@@ -34,13 +35,16 @@ def test_rivalry_is_its_twin():
     atoms[3] = 0
     found = rivalry(atoms, phrases, names)
     expected = [
-        [beaten_twin(d.numpy(), t.numpy(), names.numpy(), (KIN, BEHIND, LEAD)) for t in phrases]
+        [
+            beaten_twin(d.numpy(), t.numpy(), names.numpy(), (RIVALS.kin, RIVALS.behind, RIVALS.lead))
+            for t in phrases
+        ]
         for d in atoms
     ]
     # Sums of four products near 1, of float64: a few of its steps of 2.2e-16.
     assert torch.allclose(found, torch.tensor(expected, dtype=torch.float64), rtol=0, atol=1e-14)
-    assert (phrases @ names.T > KIN).any(), "some name is kin"
-    assert (found[3] == 0).all() and (found.amax() == LEAD) and (found.amin() < 0)
+    assert (phrases @ names.T > RIVALS.kin).any(), "some name is kin"
+    assert (found[3] == 0).all() and (found.amax() == RIVALS.lead) and (found.amin() < 0)
 
 
 @pytest.mark.parametrize("repeated", [False, True])
@@ -83,7 +87,7 @@ def test_names_of_the_same_thing_are_no_rivals():
     space = language_space()
     picture, wall = space.encode(["picture", "wall"]).split(1)
     added = rivalled(picture, replace(space, rivals=("picture",)), ["painting"], space.encode(["painting"]))
-    assert added.item() == pytest.approx(LEAD)
+    assert added.item() == pytest.approx(RIVALS.lead)
     assert (
         rivalled(wall, replace(space, rivals=("wall",)), ["painting"], space.encode(["painting"])).item() < 0
     )
@@ -96,7 +100,7 @@ def test_a_name_written_apart_is_the_name():
         [True, True], [False, False], [False, False], [False, False],
     ]  # fmt: skip
     wall, stand = space.encode(["wall", "night stand"]).split(1)
-    assert rivalled(wall, space, ["night stand"], stand).item() == pytest.approx(LEAD)
+    assert rivalled(wall, space, ["night stand"], stand).item() == pytest.approx(RIVALS.lead)
 
 
 def test_nothing_has_no_rivals():

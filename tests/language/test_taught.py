@@ -8,8 +8,9 @@ from torch.nn.functional import normalize
 
 from langflash_core.errors import PromptError
 from langflash_core.language.relevance import compile_query, relevance_maps, spoken_dictionary
+from langflash_core.language.settings import TEACHING
 from langflash_core.language.spaces import language_space
-from langflash_core.language.taught import ALIKE, taught_dictionary
+from langflash_core.language.taught import taught_dictionary
 from langflash_core.types import Record, Scene
 from tests.app.window.scenes import room
 
@@ -103,6 +104,6 @@ def test_lessons_reach_only_what_is_alike_and_nothing_is_taught_by_nothing(scene
     assert taught_dictionary(dictionary, Record(), SPACE) is dictionary
     assert torch.equal(taught_dictionary(dictionary, Record(atom_names={0: "\U0001f6cb"}), SPACE), dictionary)
     far = torch.stack((dictionary[0], dictionary[1], SPACE.encode(["sink"])[0]))
-    assert float((far[0] @ far[2]).abs()) < ALIKE
+    assert float((far[0] @ far[2]).abs()) < TEACHING.alike
     moved = taught_dictionary(far, Record(atom_names={0: "throne"}), SPACE)
     assert torch.equal(moved[1:], far[1:]) and not torch.equal(moved[0], far[0])

@@ -3,7 +3,6 @@
 from dataclasses import dataclass
 
 import pytest
-import torch
 from torch import Tensor
 
 from langflash_core.base.detail import DETAILS
@@ -11,14 +10,13 @@ from langflash_core.mending.looks import drawn
 from langflash_core.surface.fine import coloured_scene, covered_scene
 from langflash_core.types import Scene
 from tests.scene.photographed import SCREEN, WALL, photographed
+from tests.torch_threads import torch_threads
 
 
 @pytest.fixture(autouse=True)
 def one_thread():
-    before = torch.get_num_threads()
-    torch.set_num_threads(1)
-    yield
-    torch.set_num_threads(before)
+    with torch_threads(1):
+        yield
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,8 @@ import pytest
 import torch
 
 from langflash_core.geometry.harmonics import SH_C0
-from langflash_core.mending.coarse import LEVELS, coarsened, quantised
+from langflash_core.mending.coarse import coarsened, quantised
+from langflash_core.mending.settings import COARSENING
 from langflash_core.scene.thin import covered_areas
 
 SIDE = 0.15
@@ -24,8 +25,8 @@ def test_a_block_is_the_mean_of_its_cube(known, squares):
     for cube in np.unique(cubes, axis=0):
         rows = (cubes == cube).all(1)
         mean = (colours[rows] * areas[rows, None]).sum(0) / areas[rows].sum()
-        expected.add(tuple((mean.clip(0, 1) * (LEVELS - 1)).round().astype(int).tolist()))
-    shown = ((0.5 + SH_C0 * made.gaussians.sh[:, 0]) * (LEVELS - 1)).double().numpy()
+        expected.add(tuple((mean.clip(0, 1) * (COARSENING.levels - 1)).round().astype(int).tolist()))
+    shown = ((0.5 + SH_C0 * made.gaussians.sh[:, 0]) * (COARSENING.levels - 1)).double().numpy()
     if squares:
         assert {tuple(row) for row in shown.round().astype(int).tolist()} == expected
         assert np.abs(shown - shown.round()).max() < 1e-3  # nothing below the steps
@@ -62,4 +63,4 @@ def test_a_side_of_nothing_is_refused(known):
 
 
 def test_quantised_has_sixteen_levels():
-    assert len(set(quantised(torch.linspace(-1, 2, 999)).tolist())) == LEVELS
+    assert len(set(quantised(torch.linspace(-1, 2, 999)).tolist())) == COARSENING.levels

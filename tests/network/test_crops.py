@@ -2,7 +2,8 @@
 
 import torch
 
-from langflash_core.network.semantics.crops import SIDE, crop_atoms, group_box
+from langflash_core.network.semantics.crops import crop_atoms, group_box
+from langflash_core.network.semantics.settings import CROPS
 
 
 def test_a_box_holds_its_group_with_a_margin_and_stays_square():
@@ -38,6 +39,6 @@ def test_each_group_is_shown_from_the_photo_that_has_most_of_it():
         return pictures.mean((2, 3)) * 7
 
     atoms = crop_atoms(weights, photos, embed)
-    assert shown[0].shape == (2, 3, SIDE, SIDE)
+    assert shown[0].shape == (2, 3, CROPS.side, CROPS.side)
     torch.testing.assert_close(atoms, torch.tensor([[1.0, 0, 0], [0, 1, 0]]))
     assert crop_atoms(torch.zeros(2, 0, 8, 8), photos, embed).shape == (0, 3)

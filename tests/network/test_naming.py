@@ -10,7 +10,8 @@ from torch.nn import functional as F
 from langflash_core.geometry.cameras import unproject
 from langflash_core.network import MINI
 from langflash_core.network.encoders.shared import Tokens
-from langflash_core.network.semantics.naming import DEEP, PLACE, PartNamer, describe, places, upright
+from langflash_core.network.semantics.naming import PartNamer, describe, places, upright
+from langflash_core.network.semantics.settings import PART_NAMING
 
 SIDE = 64
 KS = torch.tensor([[60.0, 0, SIDE / 2], [0, 60.0, SIDE / 2], [0, 0, 1]])[None]
@@ -54,7 +55,7 @@ def test_places_are_metres_over_the_floor():
     found = places(weights, depths, torch.eye(4)[None], KS)
     points = (unproject(depths, KS) @ axes.T)[board]
     low, high = points.amin(0), points.amax(0)
-    assert found.shape == (2, PLACE)
+    assert found.shape == (2, PART_NAMING.place)
     # 3 % are cut off on each side, so lengths lose about 6 %; heights shift by as much.
     assert float(found[0, 0].exp()) == pytest.approx(float(high[0] - low[0]), rel=0.1)
     assert float(found[0, 1].exp()) == pytest.approx(float(high[1] - low[1]), rel=0.1)
@@ -93,12 +94,12 @@ def test_unknown_depths_say_nothing(bad):
     found = places(
         weights, torch.full((2, SIDE, SIDE), bad), torch.eye(4).repeat(2, 1, 1), KS.repeat(2, 1, 1)
     )
-    assert torch.equal(found, torch.zeros(3, PLACE))
+    assert torch.equal(found, torch.zeros(3, PART_NAMING.place))
     assert places(
         weights[:, :0], torch.ones(2, SIDE, SIDE), torch.eye(4).repeat(2, 1, 1), KS.repeat(2, 1, 1)
     ).shape == (
         0,
-        PLACE,
+        PART_NAMING.place,
     )
 
 
@@ -119,7 +120,7 @@ def test_a_new_namer_changes_nothing_and_parts_may_come_in_any_order():
     torch.manual_seed(0)
     namer = PartNamer(MINI)
     atoms = F.normalize(torch.randn(5, 384), dim=-1)
-    looks, where = torch.randn(5, DEEP * 384), torch.randn(5, PLACE)
+    looks, where = torch.randn(5, PART_NAMING.deep * 384), torch.randn(5, PART_NAMING.place)
     torch.testing.assert_close(namer(atoms, looks, where), atoms)
     torch.nn.init.normal_(namer.out.weight, std=0.02)
     order = torch.tensor([3, 0, 4, 1, 2])

@@ -7,7 +7,8 @@ from safetensors.torch import save_file
 from langflash_core.base.resources import weights_folder
 from langflash_core.errors import InputError, WeightsError
 from langflash_core.network.semantics.mobile_sam.model import MobileSam
-from langflash_core.network.semantics.outlines import FILES, SURE, Outlines, mobile_sam_checkpoint, outlined
+from langflash_core.network.semantics.outlines import FILES, Outlines, mobile_sam_checkpoint, outlined
+from langflash_core.network.semantics.settings import OUTLINING
 from langflash_core.pipeline import reconstruct
 from tests.network.published import mobile_sam_name
 
@@ -41,7 +42,7 @@ def test_an_answer_that_means_the_same_redraws_its_group():
     redrawn = outlined(halves(), logits, torch.tensor([0.8, 0.0]))
     assert (redrawn[0, :, :10] > 0.9).all() and (redrawn[1, :, 10:] > 0.9).all()
     assert torch.allclose(redrawn.sum(0), torch.ones(12, 16))
-    expected = 0.3 * torch.tensor(SURE).exp()
+    expected = 0.3 * torch.tensor(OUTLINING.sure).exp()
     assert redrawn[0, 0, 9] == pytest.approx(float(expected / (expected + 0.7)), abs=1e-6)
 
 

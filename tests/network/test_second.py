@@ -16,15 +16,8 @@ from langflash_core.network.encoders.others import CHANNELS, SIDE, OtherEyes, se
 from langflash_core.network.encoders.shared import Tokens
 from langflash_core.network.model import Seen
 from langflash_core.network.semantics.naming import describe, places
-from langflash_core.network.semantics.second import (
-    COUNTS,
-    PHOTOS,
-    STEEPNESS,
-    TOGETHER,
-    SecondHead,
-    both,
-    looked_at,
-)
+from langflash_core.network.semantics.second import SecondHead, both, looked_at
+from langflash_core.network.semantics.settings import OPINION
 
 
 @pytest.fixture(scope="module")
@@ -121,8 +114,8 @@ def test_a_part_is_the_mean_of_its_pixels(others):
     words = head.words.weight.double(), head.words.bias.double()
     said = torch.einsum("oc,vchw->vohw", words[0], maps) + words[1][:, None, None]
     said = said / said.norm(dim=1, keepdim=True)
-    odds = STEEPNESS * torch.einsum("c,vchw->vhw", head.photo.weight[0].double(), maps).mean()
-    said = said / (1 + torch.exp(-TOGETHER * odds) / PHOTOS)
+    odds = OPINION.steepness * torch.einsum("c,vchw->vhw", head.photo.weight[0].double(), maps).mean()
+    said = said / (1 + torch.exp(-OPINION.together * odds) / OPINION.photos)
     for part in range(3):
         own = weights[:, part].double()
         slow = (said * own[:, None]).sum((0, 2, 3)) / own.sum()
@@ -139,10 +132,10 @@ def test_they_are_heard_as_far_as_a_scene_looks_like_photos(others):
     head.begin()
     unsure = looked_at(others, head, images.split(1), weights)
     for odds, heard in ((20.0, 1.0), (-20.0, 0.0)):
-        nn.init.constant_(head.photo.bias, odds / STEEPNESS)
+        nn.init.constant_(head.photo.bias, odds / OPINION.steepness)
         said = looked_at(others, head, images.split(1), weights)
         # Twice 20 nats are e^-40 from certainty; who knows nothing expects three photos of four.
-        assert torch.allclose(said, heard * unsure * (1 + 1 / PHOTOS), atol=1e-7)
+        assert torch.allclose(said, heard * unsure * (1 + 1 / OPINION.photos), atol=1e-7)
 
 
 def test_odds_are_added():
@@ -151,8 +144,8 @@ def test_odds_are_added():
     first, second = F.normalize(torch.randn(3, 384), dim=1), 0.3 * torch.randn(3, 384)
     texts = F.normalize(torch.randn(2, 384), dim=1)
     atoms = both(first, second)
-    odds = (atoms @ (texts[0] - texts[1])) * (first + COUNTS * second).norm(dim=1)
-    assert torch.allclose(odds, (first + COUNTS * second) @ (texts[0] - texts[1]), atol=1e-6)
+    odds = (atoms @ (texts[0] - texts[1])) * (first + OPINION.counts * second).norm(dim=1)
+    assert torch.allclose(odds, (first + OPINION.counts * second) @ (texts[0] - texts[1]), atol=1e-6)
     assert torch.allclose(atoms.norm(dim=1), torch.ones(3), atol=1e-6)
     assert torch.allclose(both(first, torch.zeros_like(first)), first, atol=1e-7)
 

@@ -12,7 +12,8 @@ from langflash_core import pipeline
 from langflash_core.export.png import to_8bit
 from langflash_core.geometry.cameras import invert_rigid
 from langflash_core.language.spaces import language_space
-from langflash_core.scene.exposure import FAR, lit_camera, median_distance
+from langflash_core.scene.exposure import lit_camera, median_distance
+from langflash_core.scene.settings import EXPOSURE
 from langflash_core.splat import render
 from langflash_core.splat.projection import view_colours
 from langflash_core.types import Camera, Scene
@@ -42,7 +43,7 @@ def lit_scene(light: dict | None = None, scale: float = 1.0) -> Scene:
 
 def twin(scene: Scene, viewmat: torch.Tensor) -> np.ndarray:
     """As the formula reads, photo after photo, angles by arccos."""
-    here, total, logs, offsets = invert_rigid(viewmat.double()), 1 / FAR**2, np.zeros(3), np.zeros(3)
+    here, total, logs, offsets = invert_rigid(viewmat.double()), 1 / EXPOSURE.far**2, np.zeros(3), np.zeros(3)
     for view, own in enumerate(scene.viewmats.double()):
         place = invert_rigid(own)
         cosine = float(place[:3, 2] @ here[:3, 2])
@@ -78,7 +79,7 @@ def test_far_away_it_is_the_scenes_own():
     viewmat[2, 3] = 1000 * median_distance(scene)
     found = lit_camera(scene, Camera(viewmat, scene.Ks[0], 40, 30)).light
     assert found is not None
-    share = 3 * (FAR / 999) ** 2  # of all photos together, at most
+    share = 3 * (EXPOSURE.far / 999) ** 2  # of all photos together, at most
     assert (found - torch.tensor([[1.0] * 3, [0.0] * 3])).abs().max() < share * 0.4
 
 

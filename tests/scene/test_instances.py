@@ -3,7 +3,8 @@
 import numpy as np
 import torch
 
-from langflash_core.scene.instances import LINK, disc_radii, instances
+from langflash_core.scene.instances import disc_radii, instances
+from langflash_core.scene.settings import INSTANCES
 from langflash_core.types import Gaussians
 
 
@@ -89,10 +90,10 @@ def test_parts_are_those_of_all_pairs():
     gaussians = discs(means, radii)
     numbers = instances(gaussians, np.ones(len(means), bool))
     means32 = gaussians.means.double().numpy()
-    for part in slowly(means32, disc_radii(gaussians), LINK):
+    for part in slowly(means32, disc_radii(gaussians), INSTANCES.link):
         assert len(set(numbers[list(part)])) == 1  # crumbs are 0 together
     kept = [set(np.flatnonzero(numbers == n)) for n in range(1, numbers.max() + 1)]
-    assert all(part in slowly(means32, disc_radii(gaussians), LINK) for part in kept)
+    assert all(part in slowly(means32, disc_radii(gaussians), INSTANCES.link) for part in kept)
 
 
 def test_nothing_one_and_nan():

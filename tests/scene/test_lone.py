@@ -93,6 +93,6 @@ def test_a_denial_is_taken_back(room: Scene) -> None:
 def test_what_cannot_be_is_said(room: Scene, part: torch.Tensor, monkeypatch) -> None:
     with pytest.raises(ValueError, match="at least one Gaussian"):
         with_lone_part(room, torch.zeros_like(part))
-    monkeypatch.setattr(lone, "MOST_ATOMS", room.semantics.num_atoms)
+    monkeypatch.setattr(lone, "JOINING", replace(lone.JOINING, most_atoms=room.semantics.num_atoms))
     with pytest.raises(InputError, match="merge groups"):
         with_lone_part(room, part)

@@ -9,7 +9,8 @@ import pytest
 import torch
 
 from langflash_core.geometry.cameras import invert_rigid
-from langflash_core.scene.lookouts import FOV, lookouts
+from langflash_core.scene.lookouts import lookouts
+from langflash_core.scene.settings import LOOKOUTS
 from langflash_core.types import Camera, Gaussians
 
 SIZE = (64, 48)
@@ -61,7 +62,7 @@ def test_every_camera_is_upright_and_of_the_size_asked_for(room):
         assert torch.allclose(turn @ turn.T, torch.eye(3), atol=1e-5)  # of float32
         assert float(torch.linalg.det(turn)) > 0 and abs(float(turn[0, 1])) < 1e-6  # no roll
         assert float(turn[1, 1]) > 0.9  # what is down is down
-        assert 2 * math.degrees(math.atan(SIZE[0] / 2 / float(camera.K[0, 0]))) == pytest.approx(FOV)
+        assert 2 * math.degrees(math.atan(SIZE[0] / 2 / float(camera.K[0, 0]))) == pytest.approx(LOOKOUTS.fov)
 
 
 def test_they_look_at_different_things(room):

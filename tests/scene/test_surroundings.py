@@ -10,13 +10,8 @@ import torch
 from langflash_core.geometry import poses
 from langflash_core.geometry.nearness import Nearness
 from langflash_core.geometry.poses import Pose, Vector, from_view
-from langflash_core.scene.surroundings import (
-    A_PHOTO,
-    MOST,
-    QUANTILES,
-    Surroundings,
-    surroundings_of,
-)
+from langflash_core.scene.settings import SURROUNDINGS
+from langflash_core.scene.surroundings import Surroundings, surroundings_of
 from langflash_core.types import Scene
 from tests.app.window.scenes import room
 
@@ -110,7 +105,9 @@ def test_the_middle_of_what_is_near_is_nearer_than_the_middle(scene: Scene) -> N
 
 def test_samples_are_few_and_of_their_photos(scene: Scene) -> None:
     around = surroundings_of(scene)
-    assert around is not None and 100 < len(around.places) <= min(MOST, 2 * len(QUANTILES) * A_PHOTO)
+    assert around is not None and 100 < len(around.places) <= min(
+        SURROUNDINGS.most, 2 * len(SURROUNDINGS.quantiles) * SURROUNDINGS.a_photo
+    )
     np.testing.assert_array_equal(around.places, scene.gaussians.means.double().numpy()[around.rows])
     np.testing.assert_allclose(around.eyes[:, 0], 0.3 * (around.rows % 2), atol=1e-6)
     distances = np.linalg.norm(around.places - around.eyes, axis=1)

@@ -9,7 +9,8 @@ import torch
 
 from langflash_core.errors import InputError
 from langflash_core.geometry.cameras import invert_rigid
-from langflash_core.scene.trust import FULL, NONE, faded, trust
+from langflash_core.scene.settings import TRUST
+from langflash_core.scene.trust import faded, trust
 from langflash_core.splat import render
 from langflash_core.types import Camera, Scene
 from tests.splat.scenes import cloud
@@ -41,7 +42,7 @@ def test_trust_falls_with_the_angle_to_the_nearest_photo():
     assert values[:2] == [1, 1] and values[-3:] == [0, 0, 0]
     assert all(near > far for near, far in pairwise(values[1:7]))
     # Its slow twin: smoothstep of cosines, from the angle itself.
-    low, high = np.cos(np.radians([NONE, FULL]))
+    low, high = np.cos(np.radians([TRUST.none, TRUST.full]))
     share = (np.cos(np.radians(45)) - low) / (high - low)
     assert values[3] == pytest.approx(share**2 * (3 - 2 * share), abs=1e-6)
     both = torch.stack((aside(0.0), aside(60.0)))

@@ -2,15 +2,17 @@
 
 import dataclasses
 import itertools
+from dataclasses import replace
 
 import numpy as np
 import pytest
 import torch
 
 from langflash_core.splat import mixing as module
-from langflash_core.splat.mixing import FAINT, SMALL, mixing
+from langflash_core.splat.mixing import mixing
 from langflash_core.splat.projection import ALPHA_MAX, ALPHA_MIN, Footprints, project
 from langflash_core.splat.reference import rasterize
+from langflash_core.splat.settings import MIXING
 from langflash_core.types import Camera, Gaussians
 from tests.splat.scenes import camera, cloud, parallel, splats, turned
 
@@ -62,7 +64,7 @@ def test_some_pixels_at_a_time(monkeypatch):
     scene = cloud(200, size=0.1)
     whole = everything(scene.gaussians, camera())
     for at_once in (4, 1000):
-        monkeypatch.setattr(module, "_AT_ONCE", at_once)
+        monkeypatch.setattr(module, "MIXING", replace(module.MIXING, at_once=at_once))
         parts = everything(scene.gaussians, camera())
         assert np.array_equal(parts.indptr, whole.indptr) and np.array_equal(parts.indices, whole.indices)
         # Sums of logs begin elsewhere, in float64: the last digit of float32.
@@ -193,7 +195,9 @@ def test_nothing_and_one():
 
 
 def test_fainter_than_the_cut_is_not_there():
-    assert mixing(project(splats([(0, 0, 1.0)], opacities=0.9 * FAINT), camera()), camera(), 1).nnz == 0
+    assert (
+        mixing(project(splats([(0, 0, 1.0)], opacities=0.9 * MIXING.faint), camera()), camera(), 1).nnz == 0
+    )
 
 
 def test_more_gaussians_than_footprints():
@@ -223,13 +227,13 @@ def test_what_small_leaves_out_is_below_it():
     """Without the cut by alpha, contributions that stay are the same, and no other reaches SMALL."""
     footprints, seen = project(cloud(400, size=0.1).gaussians, camera()), camera()
     whole = mixing(footprints, seen, 400, faint=ALPHA_MIN, small=0.0).tocsr()
-    part = mixing(footprints, seen, 400, faint=ALPHA_MIN, small=SMALL).tocsr()
+    part = mixing(footprints, seen, 400, faint=ALPHA_MIN, small=MIXING.small).tocsr()
     left = (whole - part).tocoo()
-    assert part.nnz < whole.nnz and np.abs(left.data).max() < SMALL
-    assert part.data.min() >= SMALL and np.isin(part.data, whole.data).all()
+    assert part.nnz < whole.nnz and np.abs(left.data).max() < MIXING.small
+    assert part.data.min() >= MIXING.small and np.isin(part.data, whole.data).all()
 
 
-@pytest.mark.parametrize("small", [0.0, SMALL, 0.1])
+@pytest.mark.parametrize("small", [0.0, MIXING.small, 0.1])
 def test_slabs_by_depth_change_nothing(monkeypatch, small):
     """What lies behind opaque pixels is not looked at, and would have been left out."""
     opaque = dataclasses.replace(cloud(3000, size=0.08).gaussians, opacities=torch.full((3000,), 0.95))
@@ -243,7 +247,7 @@ def test_slabs_by_depth_change_nothing(monkeypatch, small):
         return pairs(table, rows, *of)
 
     monkeypatch.setattr(module._Table, "pairs", counted)
-    monkeypatch.setattr(module, "_LEAST_SLAB", 300)
+    monkeypatch.setattr(module, "MIXING", replace(module.MIXING, least_slab=300))
     parts = mixing(footprints, seen, 3000, small=small)
     assert np.array_equal(parts.indptr, whole.indptr) and np.array_equal(parts.indices, whole.indices)
     # Sums of logs begin elsewhere, in float64: the last digit of float32.
@@ -251,7 +255,7 @@ def test_slabs_by_depth_change_nothing(monkeypatch, small):
     assert small == 0 or sum(looked_at) < 0.7 * len(footprints.ids)
 
 
-@pytest.mark.parametrize("small", [0.0, SMALL])
+@pytest.mark.parametrize("small", [0.0, MIXING.small])
 def test_rows_that_are_not_wanted_are_empty_and_the_others_the_same(small):
     gaussians, seen = cloud(400, size=0.05).gaussians, camera()
     footprints = project(gaussians, seen)

@@ -7,7 +7,8 @@ import torch
 from langflash_core.errors import Cancelled
 from langflash_core.splat.projection import project
 from langflash_core.splat.reference import rasterize
-from langflash_core.splat.tiles import STOP, rasterize_tiles
+from langflash_core.splat.settings import TILES
+from langflash_core.splat.tiles import rasterize_tiles
 from langflash_core.types import Gaussians
 from tests.splat.scenes import camera, cloud, turned
 
@@ -31,7 +32,7 @@ def test_sums_are_those_of_the_reference(size: float) -> None:
     assert covered.mean() > 0.05, "the scene must cover something"
     for found, right in ((first, expected[..., :4]), (second, expected[..., 4:]), (alphas, covered)):
         error = (found.double() - right).abs()
-        assert error.mean() <= MEAN_ERROR + STOP and error.max() <= LARGEST_ERROR + STOP
+        assert error.mean() <= MEAN_ERROR + TILES.stop and error.max() <= LARGEST_ERROR + TILES.stop
 
 
 def test_each_map_has_the_type_of_its_features() -> None:
@@ -55,7 +56,7 @@ def test_what_lies_behind_a_wall_is_left_out_within_the_stated_error() -> None:
     seen, features = camera(8, 8), torch.rand(count, 1)
     (found,), _ = drawn(walls, [features], seen)
     expected, _ = rasterize(walls, features.double(), seen)
-    assert (found.double() - expected).abs().max() <= STOP + 1e-6
+    assert (found.double() - expected).abs().max() <= TILES.stop + 1e-6
 
 
 def test_nothing_and_nan_and_one_are_drawn() -> None:

@@ -17,7 +17,7 @@ from langflash_core.geometry.cameras import (
 )
 from langflash_core.geometry.rotations import matrix
 from langflash_core.rig.rig import Rig
-from langflash_core.scene.doubts import ALONE, TORN
+from langflash_core.scene.settings import DOUBTS
 from langflash_core.surface.foreseen import CELL, Foresight, draw_points, foresight
 from langflash_core.types import Camera
 
@@ -70,7 +70,7 @@ def test_photos_that_meet_are_foreseen(seen):
 def test_a_photo_with_a_wrong_pose_does_not_meet_its_neighbours(seen):
     right, wrong = seen.found(), seen.turned(1, 2.0).found()  # 3.6 pixels: a cell and more
     assert right.alike[1] is not None and wrong.alike[1] is not None
-    assert wrong.alike[1] < TORN < right.alike[1]
+    assert wrong.alike[1] < DOUBTS.torn < right.alike[1]
 
 
 def test_a_photo_with_wrong_depth_is_foreseen_and_the_others_are_not(seen):
@@ -92,7 +92,7 @@ def test_light_does_not_matter(seen):
 
 def test_a_photo_that_looks_away_stands_alone(seen):
     found = seen.turned(3, 180.0).found()
-    assert found.covered[3] == 0 < ALONE and found.alike[3] is None
+    assert found.covered[3] == 0 < DOUBTS.alone and found.alike[3] is None
 
 
 def test_two_photos_foresee_each_other(seen):

@@ -115,7 +115,7 @@ def pictures(folder: Path, quick: bool) -> dict:
 
 def _in_a_row(bench: _Bench, mode) -> float:
     """Frames a second with the card's queue kept full."""
-    renderer = bench.prepared(mode, 0)
+    renderer = bench.prepared(mode)
     start = time.perf_counter()
     for frame in range(bench.case.path.num_frames):
         bench.draw(renderer, mode, bench.camera(mode, frame))
@@ -128,12 +128,12 @@ def _colours_alone(bench: _Bench, folder: Path, number: int) -> dict:
     """Colours without language; the middle frame is kept for the comparison with gsplat."""
     taken = []
     for frame in range(bench.case.path.num_frames):
-        renderer = bench.prepared(DEFAULT, frame)
+        renderer = bench.prepared(DEFAULT)
         start = time.perf_counter()
         renderer.draw(bench.camera(DEFAULT, frame), weight_maps=False)
         bench.ctx.finish()
         taken.append(1e3 * (time.perf_counter() - start))
-    renderer = bench.prepared(DEFAULT, 0)
+    renderer = bench.prepared(DEFAULT)
     renderer.draw(bench.camera(DEFAULT, bench.case.path.num_frames // 2), weight_maps=False)
     width, height = bench.case.size
     np.save(folder / f"frame-{width}x{height}.npy", renderer.frame().rgb.float().numpy())

@@ -16,7 +16,7 @@ import numpy as np
 
 from langflash_core.inventory import Inventory, Thing, inventory
 from langflash_core.inventory.plan import Plan, floor_plan, goes_through
-from langflash_core.inventory.things import LEAST_SIZE
+from langflash_core.inventory.settings import LISTING
 from langflash_core.scene.file import load
 
 Points = Mapping[str, tuple[float, ...]]
@@ -175,7 +175,7 @@ def judge(found: Inventory, room: tuple[tuple[str, Points], ...]) -> Verdict:
 
 def nonsense(found: Inventory, plan: Plan, thing: Thing) -> bool:
     """Whether a thing is under 5 cm, over the room, or goes through a wall of the plan."""
-    if sorted(thing.size)[1] < LEAST_SIZE * found.metre or thing.bottom > found.top:
+    if sorted(thing.size)[1] < LISTING.least_size * found.metre or thing.bottom > found.top:
         return True
     openings = [opening.thing for opening in plan.openings]
     return thing not in openings and any(goes_through(thing, wall, found.metre) for wall in plan.walls)

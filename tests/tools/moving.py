@@ -1,12 +1,14 @@
 """What a hand that drags in the window comes to see: black, or the inside of something.
 
-    python -m tests.tools.moving [SCENE ...] [--shots FOLDER]
+    python -m tests.tools.moving [SCENE ...] [--places N] [--shots FOLDER]
 
 Ten places of every scene, those of photos and some between; from each the left button drags 60, 100 and 200
 pixels in eight directions, on the window's own picture with its own commands and effects, in a window of
-1280 x 800. Without a scene, on a room made here. A row a length of drag:
+1280 x 800. Without a scene, on a room made here. A row a length of drag, at photos' places and between:
 
-    black     share of the picture that shows nothing (alpha below .5), mean over places and directions
+    unseen    share of the picture where no surface is (alpha below .5), mean over places and directions
+    black     the same of the picture as the window shows it, which fills what is beside surfaces and fades:
+              share that is darker than half were all surfaces white
     lost      share of drags after which half of the picture is black that was not before
     inside    share of drags after which a surface is nearer than a tenth of the scene's depth, or such
               surfaces cover a fifth of the picture
@@ -22,6 +24,7 @@ from pathlib import Path
 
 import moderngl
 import numpy as np
+import torch
 from imgui_bundle import ImVec2, imgui
 from PIL import Image
 from scipy.spatial import KDTree
@@ -43,6 +46,7 @@ from app.window.state import State
 from app.window.viewport import Viewport
 from langflash_core.base.graphics import offscreen_context
 from langflash_core.geometry import poses
+from langflash_core.geometry.harmonics import colour_to_sh
 from langflash_core.geometry.poses import Pose
 from langflash_core.types import Scene
 from tests.app.window.headless import context
@@ -62,16 +66,19 @@ LOST = 0.5  # of the picture, black
 
 @dataclass(frozen=True)
 class Seen:
-    """black: share of the picture. inside: whether it is inside something."""
+    """unseen, black: shares of the picture. inside: whether it is inside something."""
 
+    unseen: float
     black: float
     inside: bool
 
 
 @dataclass(frozen=True)
 class Drag:
-    """One drag of so many pixels; before and after it, degrees turned, way in the scene's depths."""
+    """One drag of so many pixels, at a photo's place or between; before and after it, degrees turned, way in
+    the scene's depths."""
 
+    at_photo: bool
     pixels: int
     before: Seen
     after: Seen
@@ -141,19 +148,24 @@ class Judge:
     """Says what is seen from a pose."""
 
     def __init__(self, ctx: moderngl.Context, scene: Scene, depth: float) -> None:
-        self._renderer = moving_renderer(ctx)
+        self._renderer, self._white = moving_renderer(ctx), moving_renderer(ctx)
         self._renderer.set_scene(scene)
+        self._white.set_scene(whitened(scene))
         solid = scene.gaussians.opacities > SHOWN
         self._surfaces = KDTree(scene.gaussians.means[solid].double().numpy())
         self._near = NEAR * depth
 
     def seen(self, pose: Pose) -> Seen:
-        self._renderer.draw(poses.to_camera(pose, *JUDGED), weight_maps=False)
+        camera = poses.to_camera(pose, *JUDGED)
+        white = self._white.colours(camera, fade=True, fill=True)
+        self._renderer.draw(camera, weight_maps=False)
         frame = self._renderer.frame()
         shown = frame.alphas >= SHOWN
         covered = (shown & (frame.depths < self._near)).double().mean().item()
         nearest = self._surfaces.query(np.array(pose.centre))[0]
-        return Seen(1 - shown.double().mean().item(), bool(covered > COVERED or nearest < self._near))
+        black = float((white.max(2) < SHOWN * 255).mean())
+        inside = bool(covered > COVERED or nearest < self._near)
+        return Seen(1 - shown.double().mean().item(), black, inside)
 
     def keep(self, pose: Pose, folder: Path | None, name: str) -> None:
         """The picture from a pose as the window shows it, in a folder, if there is one."""
@@ -163,26 +175,32 @@ class Judge:
             Image.fromarray(picture).save(folder / f"{name}.png")
 
 
-def places(views: Sequence[Pose]) -> list[Pose | int]:
-    """Up to five photos' places and, up to `PLACES`, some between neighbours: a quarter of the way from a
-    photo at the least, where a drag is another one than at its own place."""
+def whitened(scene: Scene) -> Scene:
+    """The scene with all surfaces white."""
+    sh = colour_to_sh(torch.ones_like(scene.gaussians.sh[:, :1]))
+    return replace(scene, gaussians=replace(scene.gaussians, sh=sh))
+
+
+def places(views: Sequence[Pose], most: int) -> list[Pose | int]:
+    """Half of them photos' places, the others between neighbours: a quarter of the way from a photo at the
+    least, where a drag is another one than at its own place."""
     count = len(views)
-    chosen = np.unique(np.linspace(0, count - 1, min(count, PLACES // 2)).round().astype(int))
+    chosen = np.unique(np.linspace(0, count - 1, min(count, most // 2)).round().astype(int))
     some: list[Pose | int] = list(chosen.tolist())
-    for at in np.linspace(0, count - 1, PLACES - len(some) + 2)[1:-1]:
+    for at in np.linspace(0, count - 1, most - len(some) + 2)[1:-1]:
         first = min(int(at), count - 2)
         some.append(poses.blend(views[first], views[first + 1], min(max(at - first, 0.25), 0.75)))
     return some
 
 
-def walked(ctx: moderngl.Context, scene: Scene, shots: Path | None = None) -> list[Drag]:
+def walked(ctx: moderngl.Context, scene: Scene, shots: Path | None = None, most: int = PLACES) -> list[Drag]:
     """All drags of one scene; pictures of those to the left, in a folder."""
     window = Window(ctx, scene)
     assert window.state.scene.info is not None
     views = window.state.scene.info.views
     depth = float(np.median([view.reach for view in views]))
     judge, drags = Judge(ctx, scene, depth), list[Drag]()
-    for number, place in enumerate(places(views)):
+    for number, place in enumerate(places(views, most)):
         window.stand(place)
         before = judge.seen(window.state.scene.pose)
         judge.keep(window.state.scene.pose, shots, f"place{number}")
@@ -193,51 +211,56 @@ def walked(ctx: moderngl.Context, scene: Scene, shots: Path | None = None) -> li
             for frame, pose in enumerate(window.drag(*steps, DRAGS[-1] // STEP), start=1):
                 if frame * STEP not in DRAGS:
                     continue
-                drags.append(_judged(frame * STEP, before, start, pose, judge, depth))
+                at = isinstance(place, int), frame * STEP
+                drags.append(_judged(at, before, start, pose, judge, depth))
                 if way == DIRECTIONS // 2:
                     judge.keep(pose, shots, f"place{number}_left{frame * STEP}")
     window.viewport.release()
     return drags
 
 
-def _judged(pixels: int, before: Seen, start: Pose, end: Pose, judge: Judge, depth: float) -> Drag:
+def _judged(at: tuple[bool, int], before: Seen, start: Pose, end: Pose, judge: Judge, depth: float) -> Drag:
     cosine = (float(np.trace(start.axes.T @ end.axes)) - 1) / 2
     degrees = math.degrees(math.acos(min(max(cosine, -1.0), 1.0)))
     moved = math.dist(start.centre, end.centre) / depth
-    return Drag(pixels, before, judge.seen(end), degrees, moved)
+    return Drag(*at, before, judge.seen(end), degrees, moved)
 
 
 def table(name: str, drags: Sequence[Drag]) -> Iterator[str]:
     """Rows of one scene: as it stands, and after each length of drag."""
     stood = [replace(drag, pixels=0, after=drag.before, turned=0.0, moved=0.0) for drag in drags]
-    for pixels in (0, *DRAGS):
-        some = [drag for drag in (*stood, *drags) if drag.pixels == pixels]
-        black, inside, turned, moved = (
-            float(np.mean(numbers))
-            for numbers in zip(
-                *((d.after.black, d.after.inside, d.turned, d.moved) for d in some), strict=True
+    for at_photo in (True, False):
+        for pixels in (0, *DRAGS):
+            some = [drag for drag in (*stood, *drags) if (drag.at_photo, drag.pixels) == (at_photo, pixels)]
+            lost = float(np.mean([drag.before.black <= LOST < drag.after.black for drag in some]))
+            unseen, black, inside, turned, moved = (
+                float(np.mean(numbers))
+                for numbers in zip(*((*vars(d.after).values(), d.turned, d.moved) for d in some), strict=True)
             )
-        )
-        lost = float(np.mean([drag.after.black > max(drag.before.black, LOST) for drag in some]))
-        yield f"| {name} | {pixels} | {black:.1%} | {lost:.1%} | {inside:.1%} | {turned:.1f} | {moved:.3f} |"
+            where = "photos" if at_photo else "between"
+            yield (
+                f"| {name} | {where} | {pixels} | {unseen:.1%} | {black:.1%} | {lost:.1%} | {inside:.1%} "
+                f"| {turned:.1f} | {moved:.3f} |"
+            )
 
 
 def main(arguments: Sequence[str]) -> int:
     parser = argparse.ArgumentParser("moving", description=__doc__)
     parser.add_argument("scenes", nargs="*", type=Path, metavar="SCENE")
     parser.add_argument("--shots", type=Path, help="a folder for pictures")
+    parser.add_argument("--places", type=int, default=PLACES, help="of every scene, from which to drag")
     asked = parser.parse_args(arguments)
     scenes = {path.stem: path for path in asked.scenes} or {"a room made here": None}
     ctx = offscreen_context()
-    head = "| scene | pixels | black | lost | inside | turned | moved |"
-    sys.stdout.write(f"{head}\n|---|---|---|---|---|---|---|\n")
+    head = "| scene | at | pixels | unseen | black | lost | inside | turned | moved |"
+    sys.stdout.write(f"{head}\n|{'---|' * 9}\n")
     for name, path in scenes.items():
         shots = None if asked.shots is None else asked.shots / name
         if shots is not None:
             shots.mkdir(parents=True, exist_ok=True)
         scene = in_layers(box_room(), 1.0) if path is None else lf.load(path)
         with context(WINDOW):
-            sys.stdout.write("\n".join(table(name, walked(ctx, scene, shots))) + "\n")
+            sys.stdout.write("\n".join(table(name, walked(ctx, scene, shots, asked.places))) + "\n")
         sys.stdout.flush()
     ctx.release()
     return 0

@@ -27,7 +27,7 @@ from langflash_core.scene.bare import bare_scene
 from langflash_core.scene.report import describe_file
 from langflash_core.scene.tour import Note, Stop, Tour, read_tour, told_tour
 from tests.app.cli.conftest import stripes
-from tests.export.mutations import other_files, reader_of, whole_files
+from tests.export.mutations import PHOTOS, other_files, reader_of, whole_files
 from tests.export.splats import random_gaussians
 
 STEP = "step-1.kept.npz"
@@ -151,6 +151,7 @@ READERS: tuple[tuple[str, tuple[str, ...], Callable[[Path], object]], ...] = (
     ("transforms", ("transforms.json",), _posed),
     ("colmap", ("cameras.txt", "images.txt"), _posed),
     ("edits", ("a.edits",), _of),
+    ("photo", (*(f"a{suffix}" for suffix in PHOTOS), "deep.png"), _of),
     ("session", ("session-1.json",), _session),
     ("preferences", ("preferences.json",), lambda path: preferences.load(path)),
     ("prompts", ("a.prompts.json",), read_prompts),

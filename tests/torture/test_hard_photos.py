@@ -4,7 +4,8 @@ import pytest
 import torch
 
 from langflash_core.errors import ImageError
-from langflash_core.images.triage import BLANK_SPREAD, check_shown
+from langflash_core.images.settings import JUDGING
+from langflash_core.images.triage import check_shown
 from tests.torture import hard_photos
 
 
@@ -19,10 +20,10 @@ def test_photos_of_nothing_make_no_scene(name, tmp_path):
 def test_what_is_nearly_dark_is_still_taken():
     """A ramp of just so much, and a little less; one photo that shows something is enough."""
     ramp = torch.linspace(0, 1, 101).expand(3, 8, 101)
-    check_shown(["a"], [ramp * BLANK_SPREAD / 0.98])
+    check_shown(["a"], [ramp * JUDGING.blank_spread / 0.98])
     check_shown(["a", "b"], [ramp * 0, ramp])
     with pytest.raises(ImageError, match="a shows nothing"):
-        check_shown(["a"], [ramp * BLANK_SPREAD / 1.1])
+        check_shown(["a"], [ramp * JUDGING.blank_spread / 1.1])
 
 
 def test_two_photos_of_noise_make_a_finite_scene(tmp_path):

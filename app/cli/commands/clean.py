@@ -5,15 +5,8 @@ from typing import TYPE_CHECKING, TextIO
 
 from langflash_core.base.files import check_output_file, make_folder, readable_file
 from langflash_core.errors import InputError
-from langflash_core.mending.recipes import (
-    KINDS,
-    STRENGTH,
-    Recipe,
-    load_recipe,
-    parsed_box,
-    parsed_rule,
-    save_recipe,
-)
+from langflash_core.mending.recipes import KINDS, Recipe, load_recipe, parsed_box, parsed_rule, save_recipe
+from langflash_core.mending.settings import RECIPE_DEFAULTS
 
 from ..files import checked_scene
 from ..renderers import open_renderer
@@ -90,7 +83,7 @@ def _recipe(args: Namespace) -> Recipe:
             raise InputError(f"the recipe says what to clean up; leave {given[0]} out, or --recipe")
         recipe = load_recipe(args.recipe)
     else:
-        usual = 0.0 if args.where or args.crop else STRENGTH
+        usual = 0.0 if args.where or args.crop else RECIPE_DEFAULTS.strength
         recipe = Recipe(
             strength=usual if args.strength is None else args.strength,
             kinds=tuple(args.kinds or KINDS),

@@ -20,7 +20,7 @@ from langflash_core.base.files import (
 )
 from langflash_core.base.picture_files import opened_picture
 from langflash_core.errors import OutputError
-from langflash_core.images.pictures import FILM_PHOTOS
+from langflash_core.images.settings import PHOTO_LIMITS
 from langflash_core.images.still_names import is_still, shown_name
 from langflash_core.images.strip import Choice, Strip, choose, notes_on
 
@@ -39,7 +39,7 @@ def run(args: Namespace, out: TextIO) -> None:
     _check_output(args)
     with ProgressBar() as progress:
         strip = look_through(args.film, progress, start=args.start, end=args.end, every=args.every)
-        choice = choose(strip, args.most or FILM_PHOTOS)
+        choice = choose(strip, args.most or PHOTO_LIMITS.film_photos)
         progress("writing", 1.0)
         document = _document(args.output, strip, choice)
         with filled_atomically(args.output) as folder:

@@ -35,13 +35,14 @@ def run(args: Namespace, out: TextIO) -> None:
 
     from langflash_core.export.paint import write_picture
     from langflash_core.meant import answering
-    from langflash_core.mending.hiding import BLOCKS, Hiding, hide, preview
+    from langflash_core.mending.hiding import Hiding, hide, preview
     from langflash_core.mending.looks import before_and_after
-    from langflash_core.mending.recipes import MARGIN
+    from langflash_core.mending.settings import HIDING, RECIPE_DEFAULTS
     from langflash_core.scene.file import save
 
     blocks, margin = (
-        usual if told is None else told for told, usual in ((args.blocks, BLOCKS), (args.margin, MARGIN))
+        usual if told is None else told
+        for told, usual in ((args.blocks, HIDING.blocks), (args.margin, RECIPE_DEFAULTS.margin))
     )
     hiding = Hiding(args.how, blocks, margin, args.photos == "painted", not args.open)
     scene = open_scene(args.scene)

@@ -89,20 +89,18 @@ def _elsewhere(
     """A sentence for each phrase that was not found in the first photo and is found in another: the one whose
     own Gaussians answer it most, looked at."""
     from langflash_core import pipeline
-    from langflash_core.language.gaussians import gaussian_relevance
+    from langflash_core.language.gaussians import answering_shares, photos_that_answer
     from langflash_core.language.spaces import language_space
     from langflash_core.language.spoken import compile_spoken
 
     missed = [answer.prompt for answer in result.answers if not answer.found]
-    if not missed or scene.view_ids is None or scene.num_views < 2:
+    if not missed:
         return []
     space = language_space(scene.semantics.space)
     compiled = compile_spoken(scene, space, missed, negatives=negatives, mode=mode)
-    told, answering = [], gaussian_relevance(scene.semantics, compiled) >= compiled.threshold
-    for prompt, hits in zip(missed, answering, strict=True):
-        counts = scene.view_ids[hits].long().bincount(minlength=scene.num_views)
-        view = int(counts.argmax())
-        if view and counts[view]:
+    told, photos = [], photos_that_answer(answering_shares(scene, compiled))
+    for prompt, view in zip(missed, photos, strict=True):
+        if view:
             seen = pipeline.query(scene, [prompt], view=view, mode=mode, negatives=negatives, render=render)
             if seen.answers[0].found:
                 said = f"{prompt!r} is not in photo 1, but photo {view + 1} shows it"

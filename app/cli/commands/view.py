@@ -6,15 +6,19 @@ from typing import TextIO
 from langflash_core.base.files import readable_file
 from langflash_core.errors import ImageError
 
+from ..files import out_of_folders
+
 
 def run(args: Namespace, out: TextIO) -> int:
     """Open the window on photos, a scene, or nothing; returns when it is closed.
 
     Raises:
-        ImageError: a path leads nowhere. GraphicsError: there is no display or no OpenGL.
+        ImageError: a path leads nowhere, or to a folder without photos.
+        GraphicsError: there is no display or no OpenGL.
     """
-    for path in args.paths:
+    paths = out_of_folders(args.paths)
+    for path in paths:
         readable_file(path, "photo or scene", ImageError)
     from ...window import run as open_window
 
-    return open_window(args.paths)
+    return open_window(paths)

@@ -12,7 +12,7 @@ from langflash_core.base.request import spoken
 from langflash_core.errors import ImageError, InputError, WeightsError
 from langflash_core.lab.evaluation.rooms.run import run_eval
 from langflash_core.lab.evaluation.tables import markdown
-from langflash_core.lab.photos import PhotoFolder, chosen_ids
+from langflash_core.lab.photos import chosen_ids
 from langflash_core.lab.training.stages.stage import guided
 from langflash_core.network import load_network
 
@@ -118,9 +118,6 @@ def _posed(args: Namespace, out: TextIO) -> None:
         raise InputError(
             f"{args.folder} has no poses.txt; add it, or judge single photos with photos-labelled"
         )
-    if args.photos:
-        _stretches(args, folder, out)
-        return
     from langflash_core.lab.evaluation.photo_tables import posed_markdown
     from langflash_core.lab.evaluation.posed import APART, PAIRS, chosen_triples, run_posed
 
@@ -139,18 +136,6 @@ def _posed(args: Namespace, out: TextIO) -> None:
             progress=progress,
         )
     write_tables(args, result, posed_markdown(result), out)
-
-
-def _stretches(args: Namespace, folder: PhotoFolder, out: TextIO) -> None:
-    from langflash_core.lab.evaluation.photo_tables import stretches_markdown
-    from langflash_core.lab.evaluation.stretches import STRETCHES, chosen_stretches, run_stretches
-
-    stretches = chosen_stretches(folder, args.photos, args.limit or STRETCHES)
-    with ProgressBar() as progress, open_renderer(args.backend) as renderer:
-        result = run_stretches(
-            folder, stretches, renderer, args.weights, preset=args.preset, size=args.size, progress=progress
-        )
-    write_tables(args, result, stretches_markdown(result), out)
 
 
 def _calibrate(args: Namespace, out: TextIO) -> None:

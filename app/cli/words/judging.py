@@ -6,9 +6,7 @@ from ..values import above_zero, atom_count, size, whole_count
 from .shared import add_json, new_command
 
 # The decisions that `bench` compares: app.bench.modes.AXES, which would bring torch along.
-BENCH_AXES = (
-    "precision", "relevance", "weights", "answers", "resolution", "detail", "rasteriser", "sort",
-)  # fmt: skip
+BENCH_AXES = ("precision", "relevance", "weights", "resolution", "detail", "rasteriser")
 
 
 def add_bench(commands) -> None:

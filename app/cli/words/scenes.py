@@ -40,9 +40,8 @@ from .shared import (
 def add_view(commands) -> None:
     """`langflash view`."""
     view = new_command(commands, "view", "open the window; drop photos, films or scenes on it")
-    view.add_argument(
-        "paths", nargs="*", type=Path, metavar="PHOTO|FILM|SCENE", help="photos, a film, or one scene"
-    )
+    told = "photos, a film, a folder of either, or one scene"
+    view.add_argument("paths", nargs="*", type=Path, metavar="PHOTO|FILM|SCENE", help=told)
 
 
 def add_reconstruct(commands) -> None:

@@ -9,7 +9,8 @@ answers.py do the same without the maps leaving it.
 
 import numpy as np
 
-from langflash_core.language.relevance import EMPTY_NORM, CompiledQuery
+from langflash_core.language.relevance import CompiledQuery
+from langflash_core.language.settings import RELEVANCE
 
 from ..answers import Answers, in_numbers, temperature_of
 from ..layout import ATOMS_A_LAYER, PHRASES_A_LAYER
@@ -84,7 +85,8 @@ def read_maps(maps: Maps) -> np.ndarray:
 
 
 def inverse_norms(maps: np.ndarray, factor: np.ndarray) -> np.ndarray:
-    """1 / |W R| (H W,) float32 of maps (Ka, H W) and R (Ka, r); 0 where |W R| is below `EMPTY_NORM`."""
+    """1 / |W R| (H W,) float32 of maps (Ka, H W) and R (Ka, r); 0 where |W R| is below
+    `RELEVANCE.empty_norm`."""
     squares = np.zeros(maps.shape[1], np.float32)
     # R = L Q with triangular L: column j needs no atom before j.
     triangular = np.asarray(np.linalg.qr(factor.T, mode="r")).T.astype(np.float32)
@@ -92,7 +94,7 @@ def inverse_norms(maps: np.ndarray, factor: np.ndarray) -> np.ndarray:
         part = triangular[column:, column] @ maps[column:]
         squares += np.square(part, out=part)
     norms = np.sqrt(squares, out=squares)
-    return np.divide(1, norms, out=np.zeros_like(norms), where=norms >= EMPTY_NORM)
+    return np.divide(1, norms, out=np.zeros_like(norms), where=norms >= RELEVANCE.empty_norm)
 
 
 def relevancy(cosines: np.ndarray, worst: np.ndarray, temperature: float) -> np.ndarray:

@@ -18,7 +18,8 @@ from torch import Tensor
 
 from langflash_core.errors import Cancelled
 from langflash_core.geometry.nearness import NEAREST, Nearness
-from langflash_core.language.relevance import EMPTY_NORM, CompiledQuery
+from langflash_core.language.relevance import CompiledQuery
+from langflash_core.language.settings import RELEVANCE
 from langflash_core.splat.compose import shares
 from langflash_core.splat.projection import (
     ALPHA_MIN,
@@ -101,10 +102,10 @@ class StillMaps:
         return answers.reshape(-1, *self.weights.shape[:2]).copy()  # the negatives go
 
     def _inverse_norms(self, factor: np.ndarray) -> np.ndarray:
-        """1 / |W R| (H W,) float32; 0 where |W R| is below `EMPTY_NORM`."""
+        """1 / |W R| (H W,) float32; 0 where |W R| is below `RELEVANCE.empty_norm`."""
         columns = torch.from_numpy(np.ascontiguousarray(factor.T, np.float32))
         norms = torch.cat([(columns @ part.T).square_().sum(0).sqrt_() for part in self._parts()]).numpy()
-        return np.divide(1, norms, out=np.zeros_like(norms), where=norms >= EMPTY_NORM)
+        return np.divide(1, norms, out=np.zeros_like(norms), where=norms >= RELEVANCE.empty_norm)
 
     def _kept(self, key: tuple, make: Callable[[], np.ndarray]) -> np.ndarray:
         made = self._made.get(key)

@@ -96,7 +96,7 @@ class EditPrompt:
 
     def apply(self, state: State) -> State:
         after = _change_prompt(
-            state, self.key, text=self.text, score=None, like=b"", place=None, note="", reading=""
+            state, self.key, text=self.text, score=None, like=b"", place=None, photo=None, note="", reading=""
         )
         first = not state.asking.asked and bool(after.asking.asked)
         mode = pictures.HEAT if first and state.scene.mode is pictures.RGB else after.scene.mode
@@ -342,6 +342,25 @@ class PhrasesCompiled:
         for key, note, reading in told:
             state = _change_prompt(state, key, note=note, reading=reading)
         return state if state.asking.negatives else state.with_asking(usual=self.query.negative_texts)
+
+
+@dataclass(frozen=True)
+class PhrasesPlaced:
+    """Which photo shows most of the phrases `keys`, as they read then. revision: as for `Answered`."""
+
+    keys: tuple[int, ...]
+    texts: tuple[str, ...]
+    photos: tuple[int | None, ...]
+    revision: int = 0
+
+    def apply(self, state: State) -> State:
+        if self.revision != state.asking.revision:
+            return state
+        current = {p.key: p.text.strip() for p in state.asking.prompts}
+        for key, text, photo in zip(self.keys, self.texts, self.photos, strict=True):
+            if current.get(key) == text:
+                state = _change_prompt(state, key, photo=photo)
+        return state
 
 
 @dataclass(frozen=True)

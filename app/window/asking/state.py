@@ -34,8 +34,8 @@ class Prompt:
 
     threshold: the person's own, or None for the calibrated one. calibrated: what None means.
     like: a language vector as float32 bytes that is asked instead of the words. place: where in the scene it
-    fits best. note: what a person should know of its words, or "". reading: how they are understood,
-    or "" where they are asked as they stand.
+    fits best; photo: which shows most of it, from 0. note: what a person should know of its words, or "".
+    reading: how they are understood, or "" where they are asked as they stand.
     """
 
     key: int
@@ -47,6 +47,7 @@ class Prompt:
     score: float | None = None
     like: bytes = field(default=b"", repr=False)
     place: Vector | None = None
+    photo: int | None = None
     note: str = ""
     reading: str = ""
 
@@ -176,7 +177,7 @@ class Asking:
 
     def without_scene(self) -> "Asking":
         """For another scene: what belongs to the old one goes."""
-        prompts = tuple(replace(prompt, score=None) for prompt in self.prompts)
+        prompts = tuple(replace(prompt, score=None, photo=None) for prompt in self.prompts)
         return replace(
             self,
             prompts=prompts,

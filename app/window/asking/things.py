@@ -1,4 +1,4 @@
-"""The things that a scene knows, by the names of its groups."""
+"""The things that a scene knows, by the names of its groups and of its inventory."""
 
 from ..state import State
 
@@ -7,23 +7,26 @@ LEAST_SHARE = 0.004  # of what is left of the scene; smaller groups are seldom w
 
 
 def things(state: State) -> tuple[str, ...]:
-    """Names of the groups that speak, the largest first, each once."""
-    return tuple(told(state))
+    """Names that are found when asked, each once: of the groups that speak, the largest first, then of what
+    the inventory lists."""
+    return tuple(dict.fromkeys((*told(state), *state.listing.counts)))
 
 
 def told(state: State) -> dict[str, int]:
-    """The same with the largest group of each name."""
+    """Of the groups, with the largest of each name."""
     insight, history = state.asking.insight, state.editing.history
     if insight is None or history is None:
         return {}
     atoms = history.marks.atoms
     speak = [k for k, atom in enumerate(atoms) if atom.on and k < len(insight.shares)]
-    speak = [k for k in speak if insight.shares[k] >= LEAST_SHARE and (atoms[k].name or _named(state, k))]
+    speak = [k for k in speak if insight.shares[k] >= LEAST_SHARE and (atoms[k].name or _found(state, k))]
     found: dict[str, int] = {}
     for k in sorted(speak, key=lambda k: -insight.shares[k]):
         found.setdefault(state.editing.atom_name(k).lower(), k)
     return dict(list(found.items())[:MOST])
 
 
-def _named(state: State, k: int) -> bool:
-    return k < len(state.editing.names) and bool(state.editing.names[k])
+def _found(state: State, k: int) -> bool:
+    """Whether the word nearest to an atom is found when asked."""
+    words = state.editing.names[k] if k < len(state.editing.names) else ()
+    return bool(words) and words[0] in state.editing.found

@@ -16,7 +16,16 @@ from langflash_core.scene.mask import Mask
 from ..commands import Command, Notify, ShowPicture
 from ..requests import Asked, SceneTask, Task
 from ..scene.memory import SceneMemory
-from .commands import Answered, AtomsDescribed, AtomsWeighed, Binned, Narrowed, PhrasesCompiled, PromptsRead
+from .commands import (
+    Answered,
+    AtomsDescribed,
+    AtomsWeighed,
+    Binned,
+    Narrowed,
+    PhrasesCompiled,
+    PhrasesPlaced,
+    PromptsRead,
+)
 from .parting import PartsListed
 from .prompt_sets import PromptSet, read_prompts, write_prompts
 from .state import BINS, Histogram, Insight, Part, Parts
@@ -47,6 +56,7 @@ class Encode(SceneTask):
     revision: int = 0
 
     def run(self, stopping: Asked) -> Iterator[Command]:
+        from langflash_core.language.gaussians import answering_shares, photos_that_answer
         from langflash_core.language.grammar import whole
         from langflash_core.language.relevance import spoken_dictionary
         from langflash_core.language.spaces import language_space
@@ -69,6 +79,16 @@ class Encode(SceneTask):
         notes = tuple("" if like else note for note, like in noted)
         readings = tuple("" if reading.whole else str(reading) for reading in query.readings)
         yield PhrasesCompiled(self.keys, query, self.revision, notes, readings)
+        if not stopping():
+            shares = answering_shares(scene, query, _there(self.marks, len(scene.gaussians)))
+            yield PhrasesPlaced(self.keys, query.texts, photos_that_answer(shares), self.revision)
+
+
+def _there(marks: Marks | None, count: int) -> "Tensor | None":
+    """(count,) which of a scene's Gaussians are left, as it came."""
+    import torch
+
+    return None if marks is None else torch.from_numpy(marks.left.rows()[:count])
 
 
 def _vector(content: bytes) -> "Tensor":
@@ -122,9 +142,9 @@ class Answer(SceneTask):
 
     def histograms(self, relevance: "Tensor") -> tuple[Histogram, ...]:
         """How many covered pixels of the view score how high, by phrase."""
-        from langflash_core.language.answers import COVERED_ALPHA
+        from langflash_core.language.settings import ANSWERING
 
-        covered = self.frame.alphas >= COVERED_ALPHA
+        covered = self.frame.alphas >= ANSWERING.covered_alpha
         made = []
         for key, text, own in zip(self.keys, self.query.texts, relevance, strict=True):
             counts, _ = np.histogram(own[covered].numpy(), BINS, (0.0, 1.0))

@@ -6,7 +6,8 @@ one is remembered until the hidden one is saved (`Showing.unhidden`), and can be
 
 from dataclasses import dataclass, field, replace
 
-from langflash_core.mending.recipes import HOWS, MOST_MARGIN
+from langflash_core.mending.recipes import HOWS
+from langflash_core.mending.settings import RECIPE_DEFAULTS
 from langflash_core.scene.edits import Marks
 
 from ..scene.merging import Remade
@@ -40,7 +41,7 @@ class SetMargin:
     def apply(self, state: State) -> State:
         if state.editing.hiding is None:
             return state
-        margin = min(max(self.margin, 0.0), MOST_MARGIN)
+        margin = min(max(self.margin, 0.0), RECIPE_DEFAULTS.most_margin)
         return state.with_editing(hiding=replace(state.editing.hiding, margin=margin), margin=margin)
 
 

@@ -13,7 +13,6 @@ from langflash_core.base import pictures
 from langflash_core.geometry.rotations import quaternion
 from langflash_core.scene import edits
 from langflash_core.scene.changes import (
-    SCALES,
     UNTURNED,
     Change,
     Moved,
@@ -24,6 +23,7 @@ from langflash_core.scene.changes import (
     turn_matrix,
 )
 from langflash_core.scene.edits import Marks
+from langflash_core.scene.settings import CHANGES
 
 from ..scene.state import SceneInfo
 from ..state import State
@@ -201,7 +201,9 @@ def from_matrix(matrix: np.ndarray, pivot: Spot, handle: Handle, before: Moved) 
             return Moved.about(before.rows, pivot, quaternion(matrix[:3, :3] / factors))
         case Handle.SCALE:
             factor = float(factors[np.argmax(abs(np.log(factors)))])
-            return Moved.about(before.rows, pivot, scale=min(max(factor, SCALES[0]), SCALES[1]))
+            return Moved.about(
+                before.rows, pivot, scale=min(max(factor, CHANGES.scales[0]), CHANGES.scales[1])
+            )
 
 
 def numbers_of(gesture: Change | None, pivot: Spot, handle: Handle) -> tuple[float, ...]:
@@ -234,7 +236,7 @@ def of_numbers(numbers: tuple[float, ...], marks: Marks, pivot: Spot, handle: Ha
             turn: Turn = turn_about(_spot(np.array(numbers)), degrees) if degrees else UNTURNED
             return Moved.about(rows, pivot, turn)
         case Handle.SCALE:
-            return Moved.about(rows, pivot, scale=min(max(numbers[0], SCALES[0]), SCALES[1]))
+            return Moved.about(rows, pivot, scale=min(max(numbers[0], CHANGES.scales[0]), CHANGES.scales[1]))
 
 
 def _spot(values: np.ndarray) -> Spot:

@@ -200,12 +200,13 @@ class CloseCard:
 
 @dataclass(frozen=True)
 class AtomsNamed:
-    """The nearest words of every atom."""
+    """The nearest words of every atom, and those of the nearest that some photo answers."""
 
     names: tuple[tuple[str, ...], ...]
+    found: tuple[str, ...] = ()
 
     def apply(self, state: State) -> State:
-        return state.with_editing(names=self.names)
+        return state.with_editing(names=self.names, found=self.found)
 
 
 @dataclass(frozen=True)

@@ -7,7 +7,8 @@ from pathlib import Path
 import numpy as np
 
 from langflash_core.geometry.poses import Pose
-from langflash_core.mending.recipes import MARGIN, STRENGTH, Box, Recipe
+from langflash_core.mending.recipes import Box, Recipe
+from langflash_core.mending.settings import RECIPE_DEFAULTS
 from langflash_core.scene.changes import Change
 from langflash_core.scene.edits import Combine, History, Marks
 from langflash_core.scene.mask import Mask
@@ -17,7 +18,7 @@ PICK_RADIUS = 4.0
 REACH_RANGE = (1.0, 12.0)
 TOP_ATOMS = 3
 RECIPE_SUFFIX = ".recipe.json"
-BY_STRENGTH = Recipe(STRENGTH)
+BY_STRENGTH = Recipe(RECIPE_DEFAULTS.strength)
 
 
 class Tool(Enum):
@@ -176,7 +177,7 @@ class Floaters:
         return self.recipe != Recipe(self.strength)
 
     def mask(self, visible: Mask) -> Mask:
-        """Gaussians that go, of what is shown; as `langflash_core.mending.cleaning.cleaned` finds them."""
+        """Gaussians that go, of what is shown, by `langflash_core.mending.cleaning.cleaned`."""
         found = Mask.none(visible.count)
         if not self.least or self.recipe.empty:
             return found
@@ -199,7 +200,7 @@ class Hiding:
     """
 
     how: str
-    margin: float = MARGIN
+    margin: float = RECIPE_DEFAULTS.margin
     least: bytes = field(default=b"", repr=False)
     of: Marks | None = field(default=None, repr=False)
 
@@ -219,7 +220,8 @@ class Editing:
     radius: of the brush, design pixels. reach: of growing, in spacings of the Gaussians.
     drag: the region being drawn, framebuffer pixels. waiting: what the worker is looking for.
     hover: what is under the pointer. asked: where a click waits for the picture to rest.
-    names: nearest words of each atom, best first. ruler: the ends of what is measured, world.
+    names: nearest words of each atom, best first; found: the best of them that are found when asked.
+    ruler: the ends of what is measured, world.
     gesture: a change of the selection that is shown and not made yet. tint: of it, while a colour is chosen.
     hiding: how the selection is to be hidden for good, while that is asked; margin: of the last time.
     recipe_path: where a clean-up's recipe was written or read last. source: of the clone brush, world; fit:
@@ -240,13 +242,14 @@ class Editing:
     asked: Point | None = None
     card: Card | None = None
     names: tuple[tuple[str, ...], ...] = ()
+    found: tuple[str, ...] = ()
     floaters: Floaters | None = None
     ruler: tuple[Spot, ...] = ()
     handle: Handle = Handle.MOVE
     gesture: Change | None = None
     tint: Tint | None = None
     hiding: Hiding | None = None
-    margin: float = MARGIN
+    margin: float = RECIPE_DEFAULTS.margin
     last_tint: Tint = Tint()
     recipe_path: Path | None = None
     source: Spot | None = None

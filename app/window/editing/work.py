@@ -472,14 +472,28 @@ class NamePlace(Weigh):
 
 @dataclass(frozen=True)
 class NameAtoms(EditTask):
-    """The nearest household words of every atom."""
+    """The nearest household words of every atom, and which of them the scene answers."""
 
     def run(self, stopping: Asked) -> Iterator[Command]:
+        from langflash_core.language.gaussians import answering_shares
+        from langflash_core.language.relevance import compile_query
+        from langflash_core.language.settings import ANSWERING
+        from langflash_core.language.spaces import language_space
         from langflash_core.language.words import nearest_words
 
-        words, embeddings = _vocabulary(self.scene.semantics.space, ())
-        rows = (nearest_words(d, words, embeddings, WORDS_OF_ATOM) for d in self.dictionary())
-        yield AtomsNamed(tuple(tuple(each.word for each in row) for row in rows))
+        space, spoken = self.scene.semantics.space, self.spoken()
+        words, embeddings = _vocabulary(space, ())
+        near = [nearest_words(d, words, embeddings, WORDS_OF_ATOM) for d in self.dictionary()]
+        named = tuple(tuple(each.word for each in row) for row in near)
+        asked = list(dict.fromkeys(row[0] for row in named if row))
+        found = tuple[str, ...]()
+        if asked:
+            shares = answering_shares(spoken, compile_query(spoken, language_space(space), asked))
+            best = shares.amax(1).tolist()
+            found = tuple(
+                word for word, share in zip(asked, best, strict=True) if share >= ANSWERING.top_fraction
+            )
+        yield AtomsNamed(named, found)
 
 
 @dataclass(frozen=True)

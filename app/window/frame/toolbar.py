@@ -9,7 +9,7 @@ from .. import commands as do
 from ..asking.panels import dictionary
 from ..exporting import commands as export
 from ..inventory import panel as inventory_panel
-from ..kit import theme, widgets
+from ..kit import widgets
 from ..kit.look import Look
 from ..scene import camera
 from ..scene.panels import modes
@@ -40,12 +40,9 @@ def draw(state: State, look: Look) -> list[do.Command]:
 def _fov(state: State, look: Look) -> list[do.Command]:
     flat = state.scene.pose.span is not None
     imgui.begin_disabled(state.scene.info is None or flat)
-    imgui.align_text_to_frame_padding()
-    imgui.text_colored(theme.MUTED, "FOV")
-    imgui.same_line()
     tip = "Parallel rays have none" if flat else "Field of view over the longer side of the photo"
     degrees = f"{state.scene.pose.fov:.0f}°"
-    changed, fov = widgets.slider("##fov", state.scene.pose.fov, FOV_RANGE, degrees, tip, look.px(_FOV))
+    changed, fov = widgets.slider("FOV##fov", state.scene.pose.fov, FOV_RANGE, degrees, tip, look.px(_FOV))
     imgui.end_disabled()
     imgui.same_line()
     return [camera.SetFov(fov)] if changed else []

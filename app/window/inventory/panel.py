@@ -9,6 +9,7 @@ from langflash_core.geometry import poses
 from langflash_core.scene.edits import Combine
 
 from .. import commands as do
+from ..asking.things import things
 from ..exporting import commands as export
 from ..kit import boxes, theme, widgets
 from ..kit.look import Look
@@ -25,6 +26,7 @@ _BELOW, _MARGIN = 150.0, 12.0  # of axes and key frames, which are above; of the
 _BAR = 46.0  # of how sure
 _ASIDE = 120.0  # how far a caption goes to be seen
 _NAME = "##name"
+_STRUCTURE = ("wall", "floor", "ceiling")  # of langflash_core/inventory/pieces.py, which loads torch
 _EDGES = ((0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4), (0, 4), (1, 5), (2, 6), (3, 7))
 
 
@@ -97,6 +99,9 @@ def _body(state: State, look: Look, picture: tuple[float, float, float]) -> list
         imgui.pop_id()
     if not listing.rows:
         widgets.muted("Nothing here is certain enough to list; search for it with a phrase.")
+    others = [name for name in things(state) if name not in (*listing.counts, *_STRUCTURE)]
+    if others:
+        widgets.muted(f"Here too, but not listed, since no one thing of it is certain: {', '.join(others)}.")
     imgui.end_child()
     return issued + _foot(state, look)
 

@@ -8,11 +8,13 @@ from imgui_bundle import ImVec2, ImVec4, imgui
 from imgui_bundle import icons_fontawesome_6 as fa
 
 from . import theme
+from .look import Look
 
 PLAIN = imgui.WindowFlags_.no_decoration | imgui.WindowFlags_.no_move | imgui.WindowFlags_.no_saved_settings
 NO_KEYS = imgui.WindowFlags_.no_nav  # for windows that Tab and the arrows pass by
 _Value = TypeVar("_Value")
 _FOLDER = 1.3  # of a frame's height: the icon is wider than high
+_HIGH = 760.0  # design pixels of a window
 _WIDEST = 26.0  # of a line of a tooltip, in sizes of the font
 _NEW_SECONDS, _NEW_FRAMES = 0.5, 3
 """Of what has come in the place of something else: a double click takes no longer, however slow frames are; a
@@ -186,17 +188,31 @@ def folder_button() -> bool:
 
 
 def slider(
-    name: str, value: float, limits: tuple[float, float], text: str, tip: str, width: float
+    label: str, value: float, limits: tuple[float, float], text: str, tip: str, width: float
 ) -> tuple[bool, float]:
-    """A slider whose value stands beside it, where the knob cannot cover it; `width` of both."""
+    """A slider between its name, of the label what is before ##, and its value, where the knob cannot cover
+    it; `width` of slider and value, to which `named` adds the name's."""
+    name = label.partition("##")[0]
+    if name:
+        imgui.align_text_to_frame_padding()
+        imgui.text_colored(theme.MUTED, name)
+        tooltip(tip)
+        imgui.same_line(0, imgui.get_style().item_inner_spacing.x)
     room = imgui.calc_text_size("0.00").x + imgui.get_style().item_inner_spacing.x
     imgui.set_next_item_width(width - room)
-    changed, moved = imgui.slider_float(name, value, *limits, "", imgui.SliderFlags_.always_clamp)
+    flags = imgui.SliderFlags_.always_clamp
+    changed, moved = imgui.slider_float(label.removeprefix(name), value, *limits, "", flags)
     tooltip(tip)
     imgui.same_line(0, imgui.get_style().item_inner_spacing.x)
     imgui.align_text_to_frame_padding()
     imgui.text_colored(theme.MUTED, text)
     return changed, moved
+
+
+def named(label: str, width: float) -> float:
+    """Pixels of a `slider` of this width with its name."""
+    name = imgui.calc_text_size(label.partition("##")[0]).x
+    return width + name + imgui.get_style().item_inner_spacing.x
 
 
 def tooltip(text: str) -> None:
@@ -225,6 +241,11 @@ def whole(text: str, tip: str) -> None:
         imgui.text_unformatted(text)
         imgui.pop_text_wrap_pos()
         imgui.end_tooltip()
+
+
+def high(look: Look) -> bool:
+    """Whether the window is so high that hints and warnings leave room for answers."""
+    return imgui.get_io().display_size.y >= look.px(_HIGH)
 
 
 def shortened(text: str, width: float) -> str:

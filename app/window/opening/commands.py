@@ -4,20 +4,12 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 from langflash_core.errors import FilmError
-from langflash_core.images.strip import (
-    BLURRED,
-    REPEAT,
-    SMEARED,
-    Choice,
-    Still,
-    Strip,
-    choose,
-    notes_on,
-)
+from langflash_core.images.settings import CHOOSING, PHOTO_LIMITS
+from langflash_core.images.strip import REPEAT, Choice, Still, Strip, choose, notes_on
 
 from ..commands import Notify, ShowDialog
 from ..dialogs import Dialog
-from ..scene.drops import FILM_PHOTOS, MAX_PHOTOS, NOT_TYPED, Typed
+from ..scene.drops import NOT_TYPED, Typed
 from ..scene.state import LOOKING_THROUGH, Job, Photo
 from ..state import State
 from .state import NO_OPENING, Film, Folder, told_film
@@ -153,7 +145,7 @@ class FilmRead:
     def apply(self, state: State) -> State:
         state = state.with_scene(job=None)
         try:
-            film = proposed(self.path, self.strip, min(room_for_frames(state), FILM_PHOTOS))
+            film = proposed(self.path, self.strip, min(room_for_frames(state), PHOTO_LIMITS.film_photos))
         except FilmError as error:
             return Notify(str(error)).apply(state)
         state = state.with_opening(film=film)
@@ -221,12 +213,16 @@ def _reason(still: Still, choice: Choice, index: int) -> str:
         return "repeats" if still.why_not == REPEAT else "other_shots"
     if choice.until is not None and still.seconds > choice.until:
         return "beyond"
-    return "blurred" if choice.relative[index] < BLURRED or still.smear > SMEARED else "between"
+    return (
+        "blurred"
+        if choice.relative[index] < CHOOSING.blurred or still.smear > CHOOSING.smeared
+        else "between"
+    )
 
 
 def room_for_frames(state: State) -> int:
     """How many frames of a film fit into one scene with the photos in the tray."""
-    return max(MAX_PHOTOS - len(beside_frames(state)), 2)
+    return max(PHOTO_LIMITS.max_photos - len(beside_frames(state)), 2)
 
 
 def films_of(state: State) -> tuple[dict, ...]:

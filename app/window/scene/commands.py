@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from langflash_core.geometry import poses
+from langflash_core.images.settings import PHOTO_LIMITS
 from langflash_core.images.still_names import shown_name
 from langflash_core.scene.edits import Marks
 
@@ -15,7 +16,6 @@ from ..dialogs import Dialog
 from ..editing.state import fresh
 from ..filming.state import NO_FILMING
 from ..state import State
-from .drops import MAX_PHOTOS
 from .memory import SceneMemory
 from .near import first_stand
 from .state import (
@@ -50,10 +50,11 @@ class AddPhotos:
         known = {p.path for p in state.scene.photos}
         fresh = tuple(Photo(p) for p in dict.fromkeys(self.paths) if p not in known)
         photos = (*state.scene.photos, *fresh)
-        after = state.with_scene(photos=photos[:MAX_PHOTOS])
-        if len(photos) > MAX_PHOTOS:
-            left = len(photos) - MAX_PHOTOS
-            text = f"{left} photos were left out: a scene takes at most {MAX_PHOTOS}; clear the tray first."
+        after = state.with_scene(photos=photos[: PHOTO_LIMITS.max_photos])
+        if len(photos) > PHOTO_LIMITS.max_photos:
+            left = len(photos) - PHOTO_LIMITS.max_photos
+            most = PHOTO_LIMITS.max_photos
+            text = f"{left} photos were left out: a scene takes at most {most}; clear the tray first."
             after = Notify(text).apply(after)
         return after
 

@@ -13,8 +13,6 @@ from pathlib import Path
 from langflash_core.base.formats import SOG_FOLDER, is_film, is_photo, kind_of
 from langflash_core.base.outputs import DROPPED, SCENES_IN
 from langflash_core.base.picture_files import is_picture
-from langflash_core.images.pictures import FILM_PHOTOS as FILM_PHOTOS
-from langflash_core.images.pictures import MAX_PHOTOS as MAX_PHOTOS
 
 SCENE_SUFFIX = ".langflash"
 SCENE_SUFFIXES = frozenset(DROPPED)

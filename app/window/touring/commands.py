@@ -8,7 +8,8 @@ from typing import Any
 from langflash_core.base import pictures
 from langflash_core.errors import InputError
 from langflash_core.geometry.poses import Pose, Vector
-from langflash_core.scene.tour import LONGEST_TEXT, Note, Stop, Tour, checked, told_tour
+from langflash_core.scene.settings import TOURS
+from langflash_core.scene.tour import Note, Stop, Tour, checked, told_tour
 
 from ..asking.commands import AddPrompt, EditPrompt, SelectPrompt, ShowPrompt
 from ..asking.prompt_sets import MOST_PROMPTS
@@ -47,7 +48,7 @@ class AddStop:
         tour = state.tour
         number = next(n for n in range(1, 1000) if f"Stop {n}" not in tour.names)
         prompt = state.asking.active_prompt
-        phrase = prompt.text.strip()[:LONGEST_TEXT] if prompt and state.scene.mode.answers else ""
+        phrase = prompt.text.strip()[: TOURS.longest_text] if prompt and state.scene.mode.answers else ""
         stop = Stop(f"Stop {number}", state.scene.pose, phrase=phrase)
         after = _with_tour(state, f"Add stop {number}", lambda: tour.with_stop(stop))
         return after.with_touring(open=True, place=len(after.tour.stops) - 1)
@@ -120,7 +121,7 @@ class AddNote:
 
     def apply(self, state: State) -> State:
         tour = state.tour
-        note = Note(self.text[:LONGEST_TEXT], self.at, self.to, self.phrase)
+        note = Note(self.text[: TOURS.longest_text], self.at, self.to, self.phrase)
         return _with_tour(state, "Pin a note", lambda: tour.with_note(note)).with_touring(open=True)
 
 

@@ -6,7 +6,8 @@ from imgui_bundle import ImVec2, ImVec4, imgui
 from imgui_bundle import icons_fontawesome_6 as fa
 
 from langflash_core.geometry import poses
-from langflash_core.scene.tour import LONGEST_NAME, LONGEST_TEXT, Note, Stop
+from langflash_core.scene.settings import TOURS
+from langflash_core.scene.tour import Note, Stop
 
 from .. import commands as do
 from ..filming import commands as film
@@ -101,7 +102,7 @@ def _stop(state: State, number: int, stop: Stop, look: Look) -> list[do.Command]
     imgui.set_next_item_width(imgui.get_content_region_avail().x - 4 * (look.px(_BUTTON) + gap))
     _, name = imgui.input_text("##name", stop.name)
     if imgui.is_item_deactivated_after_edit() and name != stop.name:
-        name, told = _cut(name, LONGEST_NAME, "A stop's name")
+        name, told = _cut(name, TOURS.longest_name, "A stop's name")
         issued += [tour.ChangeStop(number, name=name), *told]
     widgets.whole(stop.name, "Its name")
     start, last = state.tour.start == stop.name, len(state.tour.stops) - 1
@@ -131,7 +132,7 @@ def _told(number: int, stop: Stop) -> list[do.Command]:
     _, text = imgui.input_text_with_hint("##text", "text shown here", stop.text)
     changed = imgui.is_item_deactivated_after_edit() and text != stop.text
     widgets.whole(stop.text, "")
-    text, told = _cut(text, LONGEST_TEXT, "The text shown at a stop")
+    text, told = _cut(text, TOURS.longest_text, "The text shown at a stop")
     return [tour.ChangeStop(number, text=text), *told] if changed else []
 
 
@@ -155,7 +156,7 @@ def _note(state: State, number: int, note: Note, look: Look) -> list[do.Command]
     imgui.set_next_item_width(imgui.get_content_region_avail().x - look.px(_BUTTON) - gap)
     _, text = imgui.input_text("##text", note.text)
     if imgui.is_item_deactivated_after_edit() and text != note.text:
-        text, told = _cut(text, LONGEST_TEXT, "A note")
+        text, told = _cut(text, TOURS.longest_text, "A note")
         issued += [tour.ChangeNote(number, text), *told]
     widgets.whole(note.text, "")
     imgui.same_line(0, gap)

@@ -18,7 +18,7 @@ from torch import Tensor
 from torch.nn import functional as F
 
 from langflash_core.geometry.cameras import unproject
-from langflash_core.language.answers import COVERED_ALPHA
+from langflash_core.language.settings import ANSWERING
 from langflash_core.types import Camera, Frame
 
 BLURS = (4.0, 2.0, 1.0)
@@ -59,7 +59,7 @@ def aligned_camera(draw: Callable[[Camera], Frame], camera: Camera, photo: Float
 def _fitted(shown: Tensor, frame: Frame, K: Tensor, photo: Tensor, blur: float) -> Tensor:
     """The motion (4, 4) of the camera that brings what is drawn to the photo; the identity where too little
     is drawn."""
-    drawn = (frame.alphas.cpu() >= COVERED_ALPHA) & (frame.depths.cpu() > 0)
+    drawn = (frame.alphas.cpu() >= ANSWERING.covered_alpha) & (frame.depths.cpu() > 0)
     motion = torch.eye(4, dtype=torch.float64)
     points = unproject(frame.depths.double().cpu(), K)[drawn]
     colours, blurred = _blurred(shown, blur)[drawn], _blurred(photo, blur)

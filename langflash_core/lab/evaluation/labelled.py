@@ -56,8 +56,8 @@ from langflash_core.lab.training.measures import (
     mean_iou,
     nan_mean,
 )
-from langflash_core.language.answers import COVERED_ALPHA
 from langflash_core.language.relevance import compile_query, relevance_maps
+from langflash_core.language.settings import ANSWERING
 from langflash_core.language.spaces import LanguageSpace, language_space
 from langflash_core.network import PRESETS, LangFlashNet, load_network
 from langflash_core.pipeline import query, reconstruct
@@ -249,7 +249,7 @@ def draw_photo(judged: Judged, photo: LabelledPhoto) -> tuple[Drawn, float]:
 def judge_photo(judged: Judged, photo: LabelledPhoto, tally: Tally, look: Look | None = None) -> None:
     """Everything about one photo; adds to `tally`."""
     drawn, seconds = draw_photo(judged, photo)
-    tally.note(seconds=seconds, covered=float((drawn.frame.alphas >= COVERED_ALPHA).float().mean()))
+    tally.note(seconds=seconds, covered=float((drawn.frame.alphas >= ANSWERING.covered_alpha).float().mean()))
     if photo.depths is not None:
         judge_depth(drawn, photo.metric, tally)
     if photo.labels is not None:
@@ -275,7 +275,7 @@ def _sight(judged: Judged, photo: LabelledPhoto, drawn: Drawn) -> Sight:
     numbers = {}
     if bool((truth >= 0).any()):
         numbers["labels right"] = float((found == truth)[truth >= 0].float().mean())
-    valid = (drawn.depths > 0) & (drawn.frame.alphas >= COVERED_ALPHA)
+    valid = (drawn.depths > 0) & (drawn.frame.alphas >= ANSWERING.covered_alpha)
     if bool(valid.any()):
         real = torch.where(valid, drawn.depths, 0.0)
         own = align_scale(drawn.frame.depths, real)
@@ -290,7 +290,7 @@ def _sight(judged: Judged, photo: LabelledPhoto, drawn: Drawn) -> Sight:
 
 def judge_depth(drawn: Drawn, metric: bool, tally: Tally) -> None:
     """The drawn depth with its scale aligned, a wall instead of it, and lengths as they were guessed."""
-    truth = torch.where(drawn.frame.alphas >= COVERED_ALPHA, drawn.depths, 0.0)
+    truth = torch.where(drawn.frame.alphas >= ANSWERING.covered_alpha, drawn.depths, 0.0)
     aligned = align_scale(drawn.frame.depths, truth)
     tally.note(
         depth_abs_rel=abs_rel(aligned, truth),

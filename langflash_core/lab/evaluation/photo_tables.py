@@ -57,18 +57,6 @@ POSED = (
     ("Share of the photo between that is covered", "covered", "", ""),
     ("Reconstruction, seconds a pair", "seconds", "", ""),
 )  # fmt: skip
-STRETCHES = (
-    ("Depth AbsRel of the first photo", "depth_abs_rel"),
-    ("PSNR of the photo in the middle, covered pixels (dB)", "psnr"),
-    ("PSNR of the photo in the middle, whole picture (dB)", "psnr_whole_picture"),
-    ("Share of it that is covered", "covered"),
-    ("Rotation error of the last photo (degrees)", "rotation_last"),
-    ("Direction error of the last photo (degrees)", "direction_last"),
-    ("Rotation error of all (degrees)", "rotation"),
-    ("Direction error of all (degrees)", "direction"),
-    ("Photos that found their place", "placed"),
-    ("Seconds a scene", "seconds"),
-)
 METHODS = {"atoms": "the program: atoms drawn", "features": "2D features of the photo, no scene"}
 LABEL_LISTS = {
     "classes": "37 classes",
@@ -103,16 +91,6 @@ def posed_markdown(result: dict) -> str:
     lines.append("|---" * (len(keys) + 1) + "|")
     for gap, row in gaps.items():
         lines.append(f"| {gap} | " + " | ".join(cell(row.get(key)) for key in keys) + " |")
-    return "\n".join(lines) + "\n"
-
-
-def stretches_markdown(result: dict) -> str:
-    """The table of a `run_stretches` result: a column for each number of photos."""
-    columns = result["by_photos"]
-    lines = ["| photos | " + " | ".join(columns) + " |", "|---" * (len(columns) + 1) + "|"]
-    for title, key in STRETCHES:
-        cells = [cell(row.get(key)) for row in columns.values()]
-        lines.append(f"| {title} | " + " | ".join(cells) + " |")
     return "\n".join(lines) + "\n"
 
 

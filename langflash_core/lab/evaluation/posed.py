@@ -8,11 +8,12 @@ Sizes: H W pixels as the network saw the photos.
 """
 
 import math
-import tempfile
 import time
 from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from pathlib import Path
+from tempfile import TemporaryDirectory
 
 import torch
 from PIL import Image
@@ -35,7 +36,7 @@ from langflash_core.lab.photos.fitting import FittedPhoto, fitted
 from langflash_core.lab.photos.folder import lenses_of
 from langflash_core.lab.training.losses import ssim_map
 from langflash_core.lab.training.measures import abs_rel, align_scale, delta1, nan_mean, psnr
-from langflash_core.language.answers import COVERED_ALPHA
+from langflash_core.language.settings import ANSWERING
 from langflash_core.pipeline import reconstruct
 from langflash_core.reconstruction.networks import Networks
 from langflash_core.scene.bare import bare_scene
@@ -219,7 +220,7 @@ def _sight(triple: Triple, first: FittedPhoto, target: FittedPhoto, frame: Frame
         "first photo": photo_picture(start),
         "photo between": photo_picture(truth),
         "drawn": photo_picture(frame.rgb),
-        "error": error_picture(frame.rgb, truth, (frame.alphas >= COVERED_ALPHA).numpy()),
+        "error": error_picture(frame.rgb, truth, (frame.alphas >= ANSWERING.covered_alpha).numpy()),
     }
     known = {name: values[-1] for name, values in tally.numbers.items()}
     numbers = {name: known[name] for name in ("psnr", "covered", "depth_abs_rel") if name in known}
@@ -233,19 +234,22 @@ def key_of(triple: Triple) -> str:
     return f"{triple.first}-{triple.second}"
 
 
-def relative(first: LabelledPhoto, other: LabelledPhoto) -> Tensor:
-    """World-to-camera matrix (4, 4) float64 of a photo, world = the first one's camera.
+def pose_of(photo: LabelledPhoto) -> Tensor:
+    """Camera to world (4, 4) float64.
 
     Raises:
-        InputError: one of them has no pose.
+        InputError: the photo has none.
     """
-    for photo in (first, other):
-        if photo.pose is None:
-            raise InputError(
-                f"photo {photo.id} has no line in poses.txt; add it, or take the photo out of the folder"
-            )
-    assert first.pose is not None and other.pose is not None
-    return torch.linalg.inv(other.pose.double()) @ first.pose.double()
+    if photo.pose is None:
+        raise InputError(
+            f"photo {photo.id} has no line in poses.txt; add it, or take the photo out of the folder"
+        )
+    return photo.pose.double()
+
+
+def relative(first: LabelledPhoto, other: LabelledPhoto) -> Tensor:
+    """World-to-camera matrix (4, 4) float64 of a photo, world = the first one's camera."""
+    return torch.linalg.inv(pose_of(other)) @ pose_of(first)
 
 
 def scene_of(
@@ -259,15 +263,22 @@ def scene_of(
 ) -> tuple[Scene, float]:
     """Photos through the whole program, and the seconds that took. intrinsics and what follows: as
     `reconstruct` has them."""
-    with tempfile.TemporaryDirectory() as folder:
-        paths = [Path(folder) / f"{photo.id}.png" for photo in photos]
-        for path, photo in zip(paths, photos, strict=True):
-            Image.fromarray(photo.image).save(path, "PNG", compress_level=1)
+    with files_of(photos) as paths:
         start = time.perf_counter()
         scene = reconstruct(
             paths, preset=preset, weights=weights, intrinsics=intrinsics, size=size, networks=networks
         )
         return scene, time.perf_counter() - start
+
+
+@contextmanager
+def files_of(photos: Sequence[LabelledPhoto]) -> Iterator[list[Path]]:
+    """The photos as files of one folder, which goes."""
+    with TemporaryDirectory() as folder:
+        paths = [Path(folder) / f"{photo.id}.png" for photo in photos]
+        for path, photo in zip(paths, photos, strict=True):
+            Image.fromarray(photo.image).save(path, "PNG", compress_level=1)
+        yield paths
 
 
 def as_seen(photo: LabelledPhoto, size: tuple[int, int]) -> FittedPhoto:
@@ -281,7 +292,7 @@ def judge_depth(frames: Sequence[Frame], truths: Sequence[FittedPhoto], tally: T
     (NaN: not known)."""
     scale = math.nan
     for view, (frame, truth) in enumerate(zip(frames, truths, strict=True)):
-        depths = torch.where(frame.alphas >= COVERED_ALPHA, truth.depths, 0.0)
+        depths = torch.where(frame.alphas >= ANSWERING.covered_alpha, truth.depths, 0.0)
         valid = (depths > 0) & (frame.depths > 0)
         if not bool(valid.any()):
             continue
@@ -311,7 +322,7 @@ def judge_aligned(
     truth = photo.rgb.permute(1, 2, 0).float() / 255
     plain = bare_scene(scene.gaussians, "colours")  # no weight maps are drawn
     frame = render(plain, aligned_camera(lambda at: render(plain, at), camera, truth))
-    shown = frame.alphas >= COVERED_ALPHA
+    shown = frame.alphas >= ANSWERING.covered_alpha
     tally.note(psnr_whole_picture_aligned=psnr(frame.rgb, truth))
     if bool(shown.any()):
         tally.note(psnr_aligned=psnr(frame.rgb[shown], truth[shown]))
@@ -325,7 +336,7 @@ def judge_picture(
     """The scene from where a photo was taken that it was not made of; pixels that the scene covers, and all
     of them."""
     truth, start = (p.rgb.permute(1, 2, 0).float() / 255 for p in (photo, first))
-    shown = frame.alphas >= COVERED_ALPHA
+    shown = frame.alphas >= ANSWERING.covered_alpha
     tally.note(
         covered=float(shown.float().mean()),
         psnr_whole_picture=psnr(frame.rgb, truth),

@@ -123,12 +123,11 @@ def run_sharp(
     bench: Bench,
     *,
     progress: Progress = lambda stage, fraction: None,
-    shown: Callable[[str, Pictures], None] = lambda name, pictures: None,
 ) -> dict:
     """Judge the code that makes scenes.
 
     Args:
-        count: of the subjects. shown: is given the first photo of each and what every column shows of it.
+        count: of the subjects.
 
     Returns:
         Plain JSON: "cases" with the numbers of each, "measures" their means by column and group.
@@ -139,7 +138,7 @@ def run_sharp(
     rows = []
     for done, subject in enumerate(subjects):
         progress(subject.name, done / max(count, 1))
-        rows.append(judge(subject, bench, shown))
+        rows.append(judge(subject, bench))
     if not rows:
         raise InputError("there is nothing to judge; give at least one pair, triple or room")
     made_with = str(bench.weights) if bench.weights else bench.preset

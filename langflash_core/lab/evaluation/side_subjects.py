@@ -70,7 +70,6 @@ class Case:
     name: str
     photos: tuple[LabelledPhoto, ...]
     truth: Callable[[tuple[int, int]], Subject]
-    showing: Callable[[float], Look] | None = None
 
     @property
     def intrinsics(self) -> tuple[Intrinsics, ...] | None:
@@ -129,10 +128,6 @@ def staged_case(staged: StagedRoom, renderer: RoomRenderer) -> Case:
     photos = tuple(LabelledPhoto(f"{views.seed}_{v}", views.images[v], K=K) for v in (0, 1))
     own = [_stored_look(staged, v) for v in range(len(views.images))]
 
-    def showing(degrees: float) -> Look:
-        way = _freer_way(staged, own[0].view)
-        return _look(staged, renderer, own[0].view, way, degrees)
-
     def truth(size: tuple[int, int]) -> Subject:
         if size != own[0].size:
             raise ValueError(f"size: expected that of the rooms {own[0].size}, received {size}")
@@ -145,7 +140,7 @@ def staged_case(staged: StagedRoom, renderer: RoomRenderer) -> Case:
         ]
         return Subject(tuple(own[:2]), tuple(_worth(looks, own[:2]) + _worth(own[2:], own[:2])))
 
-    return Case(str(views.seed), photos, truth, showing)
+    return Case(str(views.seed), photos, truth)
 
 
 def _stored_look(staged: StagedRoom, view: int) -> Look:
@@ -172,11 +167,6 @@ def _free(staged: StagedRoom, viewmat: np.ndarray) -> bool:
     """Whether a camera fits there: not in a wall, not in a wardrobe."""
     in_room = viewmat @ staged.home
     return stands_free(staged.room, -in_room[:3, :3].T @ in_room[:3, 3])
-
-
-def _freer_way(staged: StagedRoom, view: DepthView) -> str:
-    free = {way: sum(_free(staged, _carried(staged, view, way, a)) for a in ANGLES) for way in ACROSS_UP}
-    return "right" if free["right"] >= free["left"] else "left"
 
 
 def _worth(looks: Sequence[Look], photos: Sequence[Look]) -> list[Look]:

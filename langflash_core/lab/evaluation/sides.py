@@ -9,7 +9,7 @@ Sizes: H W pixels of the network's photos.
 """
 
 import math
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -40,7 +40,7 @@ from langflash_core.lab.evaluation.side_measures import (
 from langflash_core.lab.evaluation.side_subjects import Case, Look, Subject
 from langflash_core.lab.training.losses import ssim_map
 from langflash_core.lab.training.measures import nan_mean, psnr
-from langflash_core.language.answers import COVERED_ALPHA
+from langflash_core.language.settings import ANSWERING
 from langflash_core.reconstruction.networks import Networks
 from langflash_core.scene.gaps import filled
 from langflash_core.types import Camera, Frame, Scene
@@ -59,13 +59,11 @@ def run_sides(
     size: int | None = None,
     lpips: Lpips | None = None,
     progress: Progress = lambda stage, fraction: None,
-    made: Callable[[Case, Scene], None] = lambda case, scene: None,
 ) -> dict:
     """Judge a checkpoint, and the code that runs it.
 
     Args:
         count: of the cases. render: draws a scene. size: as `reconstruct` has it. lpips: None leaves it out.
-        made: is given every scene.
 
     Returns:
         Plain JSON: "cases" with the numbers of each, "measures" and "by_look" their means.
@@ -79,7 +77,6 @@ def run_sides(
         scene, seconds = scene_of(
             case.photos, case.intrinsics, weights=weights, preset=preset, size=size, networks=networks
         )
-        made(case, scene)
         row = judge(scene, case.truth(scene.view_size), render, lpips)
         judged.append({"name": case.name, "seconds": round(seconds, 3), **row})
     if not judged:
@@ -136,7 +133,9 @@ def judge(scene: Scene, subject: Subject, render: Render, lpips: Lpips | None = 
 
 def covered_depths(frame: Frame) -> np.ndarray:
     """Drawn depths (H, W), scene units; 0 where the scene covers less than half."""
-    return as_array(torch.where(frame.alphas >= COVERED_ALPHA, frame.depths, torch.zeros_like(frame.depths)))
+    return as_array(
+        torch.where(frame.alphas >= ANSWERING.covered_alpha, frame.depths, torch.zeros_like(frame.depths))
+    )
 
 
 def aligned(scene: Scene, placed: Sequence[Look], drawn: Sequence[np.ndarray]) -> Similarity:

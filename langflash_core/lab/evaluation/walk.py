@@ -25,19 +25,18 @@ from langflash_core.errors import InputError
 from langflash_core.lab.evaluation.alignment import aligned_camera
 from langflash_core.lab.evaluation.labelled import Render
 from langflash_core.lab.evaluation.numbers import rounded
-from langflash_core.lab.evaluation.posed import as_seen
+from langflash_core.lab.evaluation.posed import as_seen, files_of
 from langflash_core.lab.evaluation.sharp_subjects import size_of
 from langflash_core.lab.evaluation.side_measures import Similarity, as_array
 from langflash_core.lab.evaluation.sides import number
 from langflash_core.lab.evaluation.tallies import Shelf, collected
-from langflash_core.lab.evaluation.walk_aside import aside
 from langflash_core.lab.evaluation.walk_colmap import mapped
 from langflash_core.lab.evaluation.walk_measures import camera_errors, fitted_cameras, lit
-from langflash_core.lab.evaluation.walk_scenes import Bench, Made, files_of, made_of, true_cameras, with_lens
+from langflash_core.lab.evaluation.walk_scenes import Bench, Made, made_of, true_cameras, with_lens
 from langflash_core.lab.evaluation.walk_subjects import Walk
 from langflash_core.lab.photos.fitting import FittedPhoto
 from langflash_core.lab.training.measures import abs_rel, align_scale, delta1, nan_mean, psnr
-from langflash_core.language.answers import COVERED_ALPHA
+from langflash_core.language.settings import ANSWERING
 from langflash_core.scene.gaps import filled
 from langflash_core.types import Camera, Scene
 
@@ -112,7 +111,6 @@ def judge(
         made = made_of(walk, frames, bench, memory=bench.memory)
         once = {
             **once_of(made, bench.render),
-            **(aside(made, walk, bench) if bench.aside else {}),
             **(_colmap(made, bench) if bench.colmap else {}),
         }
         kept: dict[str, dict[str, float]] = {}
@@ -181,7 +179,7 @@ def _cameras(found: np.ndarray, truth: np.ndarray, fit: Similarity, length: floa
 def _depth(scene: Scene, view: int, photo: FittedPhoto, fit: Similarity, render: Render) -> dict[str, float]:
     """Drawn depth of one photo: by the scene's one scale, and by one of its own."""
     frame = render(scene, scene.camera(view))
-    truth = torch.where(frame.alphas.cpu() >= COVERED_ALPHA, photo.depths, 0.0)
+    truth = torch.where(frame.alphas.cpu() >= ANSWERING.covered_alpha, photo.depths, 0.0)
     drawn = frame.depths.cpu().float()
     return {
         "depth_abs_rel": abs_rel(drawn * fit.scale, truth),
@@ -264,7 +262,7 @@ def _alike(
 ) -> tuple[Tensor, dict[str, float]]:
     """A drawn picture, and how near it is: whole, where the scene covers it, there in the photo's light."""
     frame = bench.render(scene, camera)
-    rgb, truth, shown = frame.rgb.cpu().float(), _rgb(photo), frame.alphas.cpu() >= COVERED_ALPHA
+    rgb, truth, shown = frame.rgb.cpu().float(), _rgb(photo), frame.alphas.cpu() >= ANSWERING.covered_alpha
     numbers = {"psnr": psnr(rgb, truth), "covered": float(shown.float().mean())}
     if bool(shown.any()):
         numbers["psnr_covered"] = psnr(rgb[shown], truth[shown])

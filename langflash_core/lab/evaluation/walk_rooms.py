@@ -12,7 +12,6 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
-from scipy.ndimage import gaussian_filter1d
 
 from langflash_core.lab.evaluation.side_subjects import centre_depth
 from langflash_core.lab.rooms import RoomRenderer, StagedRoom
@@ -106,21 +105,3 @@ def _shares(renderer: RoomRenderer, way: Way, lens: _Lens) -> bool:
         return False
     Ks = np.repeat(lens.K[None], 2, axis=0)
     return all(overlap_fraction(depths[order], views[order], Ks) >= MIN_OVERLAP for order in ([0, 1], [1, 0]))
-
-
-def shaken(
-    way: Way, share: float, step: float, rng: np.random.Generator, degrees: float, moments: int
-) -> list[np.ndarray]:
-    """Cameras at moments of one exposure, evenly: the walk goes on by `step` of the way, and the hand turns
-    by about `degrees` about two axes, smoothly."""
-    turns = gaussian_filter1d(rng.normal(0, 1, (2 * moments, 2)), moments / 3, axis=0)[:moments]
-    turns = (turns - turns.mean(0)) / max(float(np.abs(turns - turns.mean(0)).max()), 1e-9)
-    turns *= math.radians(degrees) / 2
-    views = []
-    for k, (yaw, pitch) in enumerate(turns):
-        view = way(min(max(share + step * ((k + 0.5) / moments - 0.5), 0.0), 1.0)).copy()
-        cy, sy, cp, sp = math.cos(yaw), math.sin(yaw), math.cos(pitch), math.sin(pitch)
-        turn = np.array([[cy, 0, sy], [sp * sy, cp, -sp * cy], [-cp * sy, sp, cp * cy]])
-        view[:3] = turn @ view[:3]
-        views.append(view)
-    return views

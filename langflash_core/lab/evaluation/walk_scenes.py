@@ -3,10 +3,9 @@
 import math
 import multiprocessing
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
-from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -16,15 +15,12 @@ from typing import Any
 import numpy as np
 import torch
 from jaxtyping import Float
-from PIL import Image
 
-from langflash_core.errors import InputError
 from langflash_core.lab.evaluation.labelled import Render
 from langflash_core.lab.evaluation.lpips import Lpips
-from langflash_core.lab.evaluation.posed import as_seen
+from langflash_core.lab.evaluation.posed import as_seen, files_of, pose_of
 from langflash_core.lab.evaluation.side_measures import Similarity, as_array
 from langflash_core.lab.evaluation.sides import covered_depths
-from langflash_core.lab.evaluation.stretches import placed_views
 from langflash_core.lab.evaluation.walk_measures import centres_of, fitted_cameras, lens_ratio, walked
 from langflash_core.lab.evaluation.walk_subjects import Walk
 from langflash_core.lab.photos import LabelledPhoto
@@ -43,8 +39,7 @@ class Bench:
     render: draws one. weights, preset, size: as `reconstruct` has them. assume_lens: it is told nothing of
     the lens. alone: kept frames' own two photos stand
     beside. align: also from poses fitted to the pictures. lpips: None leaves it out. memory: each scene is
-    made in a process of its own, whose memory is told. colmap: its cameras stand beside. aside: also from
-    aside, by photos of the same place.
+    made in a process of its own, whose memory is told. colmap: its cameras stand beside.
     """
 
     render: Render
@@ -57,7 +52,6 @@ class Bench:
     lpips: Lpips | None = None
     memory: bool = False
     colmap: bool = False
-    aside: bool = False
     networks: Networks = field(default_factory=Networks, repr=False, compare=False)
 
 
@@ -141,16 +135,6 @@ def with_lens(lens: float, photo: FittedPhoto) -> FittedPhoto:
     return replace(photo, K=photo.K * torch.tensor([[lens, 1, 1], [1, lens, 1], [1, 1, 1]]).to(photo.K))
 
 
-@contextmanager
-def files_of(photos: Sequence[LabelledPhoto]) -> Iterator[list[Path]]:
-    """The photos as files of one folder, which goes."""
-    with TemporaryDirectory() as folder:
-        paths = [Path(folder) / f"{photo.id}.png" for photo in photos]
-        for path, photo in zip(paths, photos, strict=True):
-            Image.fromarray(photo.image).save(path, "PNG", compress_level=1)
-        yield paths
-
-
 def _made(paths: Sequence[Path], options: dict[str, Any]) -> tuple[Scene, Cost]:
     start, cpu = time.perf_counter(), time.process_time()
     scene = reconstruct(paths, **options)
@@ -177,20 +161,15 @@ def _saved(paths: Sequence[Path], options: dict[str, Any], file: Path, threads: 
     return cost if memory is None else replace(cost, memory_mb=float(memory))
 
 
-def true_cameras(photos: Sequence[LabelledPhoto]) -> Float[np.ndarray, "V 4 4"]:
-    """World to camera.
+def placed_views(scene: Scene) -> dict[str, torch.Tensor]:
+    """Poses (4, 4) by the id of their photo; a photo that was left out has none."""
+    names = (Path(name).stem for name in scene.record.photos)
+    return dict(zip(names, scene.viewmats.cpu(), strict=True))
 
-    Raises:
-        InputError: one has no pose.
-    """
-    found = []
-    for photo in photos:
-        if photo.pose is None:
-            raise InputError(
-                f"photo {photo.id} has no line in poses.txt; add it, or take the photo out of the folder"
-            )
-        found.append(np.linalg.inv(as_array(photo.pose)))
-    return np.stack(found)
+
+def true_cameras(photos: Sequence[LabelledPhoto]) -> Float[np.ndarray, "V 4 4"]:
+    """World to camera."""
+    return np.stack([np.linalg.inv(as_array(pose_of(photo))) for photo in photos])
 
 
 def wordless(scene: Scene) -> Scene:

@@ -26,7 +26,7 @@ from jaxtyping import Float
 from langflash_core.errors import InputError
 from langflash_core.geometry.cameras import invert_rigid
 from langflash_core.lab.evaluation.walk_passers import Screen, screen_in, with_somebody
-from langflash_core.lab.evaluation.walk_rooms import Way, found_way, shaken
+from langflash_core.lab.evaluation.walk_rooms import Way, found_way
 from langflash_core.lab.photos import LabelledPhoto, PhotoFolder
 from langflash_core.lab.rooms import Pack, RoomRenderer, StagedRoom, staged_room
 from langflash_core.lab.rooms.layout import Room
@@ -37,7 +37,6 @@ from langflash_core.surface.settings import LAYERS
 
 PHOTOS = (2, 4, 8, 16, 32)
 KEPT = 8
-_MOMENTS = 8  # of an exposure that is blurred
 
 
 @dataclass(frozen=True)
@@ -103,18 +102,13 @@ def _evenly(values: Sequence[int], count: int) -> tuple[int, ...]:
 @dataclass(frozen=True)
 class Walk:
     """Frames by number. photo: as the camera took it; kept: the same place as a picture should show it;
-    camera: world to camera (4, 4). others: further photos of the place, that are no frames."""
+    camera: world to camera (4, 4)."""
 
     name: str
     plan: Plan
     photo: Callable[[int], LabelledPhoto]
     kept: Callable[[int], LabelledPhoto]
     camera: Callable[[int], Float[np.ndarray, "4 4"]]
-    others: Callable[[], Iterator[LabelledPhoto]] = lambda: iter(())
-
-    @property
-    def intrinsics(self) -> tuple[float, float, float, float] | None:
-        return self.photo(0).intrinsics
 
 
 def posed_walks(folder: PhotoFolder, plan: Plan, count: int, step: int = 1) -> Iterator[Walk]:
@@ -145,10 +139,7 @@ def posed_walks(folder: PhotoFolder, plan: Plan, count: int, step: int = 1) -> I
             assert folder.poses is not None
             return np.linalg.inv(folder.poses[names[frame]].double().numpy())
 
-        def others(names: list[str] = names) -> Iterator[LabelledPhoto]:
-            return (folder.photo(id) for id in ids if id not in names)
-
-        yield Walk(f"{names[0]}-{names[-1]}", plan, photo, photo, camera, others)
+        yield Walk(f"{names[0]}-{names[-1]}", plan, photo, photo, camera)
 
 
 @dataclass(frozen=True)
@@ -156,15 +147,12 @@ class Camcorder:
     """What a camera does to the photos of a rendered walk.
 
     exposure: stops by which each photo's exposure may differ, either way, white balance by a sixth of it.
-    blur: degrees by which a hand turns while a photo is taken. times: the network's grid a photo is large.
-    bend: Brown's first radial term of the lens; kept frames are as a straight one takes them.
+    times: the network's grid a photo is large.
     passers, screens: photos in which somebody stands, and in which a screen shows another picture; kept
     frames show nobody, and the screen as it is in the others.
     """
 
     exposure: float = 0.0
-    blur: float = 0.0
-    bend: float = 0.0
     times: int = LAYERS.most_enlarged
     passers: int = 0
     screens: int = 0
@@ -271,25 +259,22 @@ class _Stage:
 
 
 def _taken(stage: _Stage, number: int, camcorder: Camcorder, kept: bool) -> LabelledPhoto:
-    """One frame. Kept ones have the walk's own exposure, no blur, no noise and no JPEG."""
-    seed, way, last = stage.staged.views.seed, stage.way, stage.last
+    """One frame. Kept ones have the walk's own exposure, no noise and no JPEG."""
+    seed = stage.staged.views.seed
     rng = np.random.default_rng([seed, 36, number])
-    view = way(number / last)
+    view = stage.way(number / stage.last)
     picture = stage.draw(view, number, kept)
-    sensor, light = stage.staged.sensor, picture.radiance
+    sensor = stage.staged.sensor
     if kept:
         sensor = replace(sensor, noise=0.0, quality=0)
     else:
-        if camcorder.blur:
-            moments = shaken(way, number / last, 0.1 / last, rng, camcorder.blur, _MOMENTS)
-            light = np.mean([stage.draw(m, number, kept).radiance for m in moments], axis=0)
         stops = rng.uniform(-1, 1, 4) * camcorder.exposure * np.array([1, 1 / 6, 0, 1 / 6])
         gains = 2.0 ** (stops[0] + stops[1:])
         balance = tuple(float(b * g) for b, g in zip(sensor.balance, gains, strict=True))
         sensor = replace(sensor, balance=balance)
     return LabelledPhoto(
         f"{seed}_{number:03d}",
-        expose(light.astype(np.float32), sensor, rng, stage.staged.grey),
+        expose(picture.radiance, sensor, rng, stage.staged.grey),
         depths=picture.depth.astype(np.float32),
         metric=True,
         K=torch.from_numpy(stage.K).float(),

@@ -6,7 +6,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from langflash_core.lab.evaluation.side_tables import mean_change
 from langflash_core.lab.evaluation.sides import number
 from langflash_core.lab.evaluation.walk import flat
-from langflash_core.lab.evaluation.walk_aside import BINS
 from langflash_core.lab.training.measures import nan_mean
 
 ROWS = (
@@ -46,17 +45,6 @@ ROWS = (
     ("... own two photos alone", "between_alone_large_lpips", ".3f"),
     ("LPIPS between at the photo's size, pose fitted", "between_large_aligned_lpips", ".3f"),
     ("... own two photos alone", "between_alone_large_aligned_lpips", ".3f"),
-    *(
-        (title.format(low, high), f"aside_{low}_{key}", form)
-        for low, high in BINS
-        for title, key, form in (
-            ("PSNR {} to {} degrees aside, as shown (dB)", "psnr", ".2f"),
-            ("... light fitted", "psnr_lit", ".2f"),
-            ("... too bright (%)", "bright", "share"),
-            ("... depth AbsRel", "depth", ".3f"),
-            ("... photos that judge", "photos", ".0f"),
-        )
-    ),
     ("Gaussians", "gaussians", ",.0f"),
     ("of these coarse", "coarse", ",.0f"),
     ("seconds", "seconds", ".1f"),

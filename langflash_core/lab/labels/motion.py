@@ -14,8 +14,8 @@ from torch import Tensor
 
 from langflash_core.base.running import Run, evenly
 from langflash_core.geometry.cameras import intrinsics_from_fov, pixel_grid, transform, unproject
-from langflash_core.images.lens import ASSUMED_FOV
 from langflash_core.images.pictures import fitting_size
+from langflash_core.images.settings import LENS_PRIOR
 from langflash_core.lab.labels.clips import Clip
 from langflash_core.network import LangFlashNet
 from langflash_core.rig.projected import see_points
@@ -78,7 +78,7 @@ def views_of(clip: Clip, frames: tuple[int, ...], pictures: tuple[Image, ...]) -
     small = [cv2.resize(picture, size, interpolation=cv2.INTER_AREA) for picture in pictures]
     images = torch.from_numpy(np.stack(small)).movedim(-1, 1).float() / 255
     if clip.Ks is None:
-        Ks = intrinsics_from_fov(ASSUMED_FOV, width, height)[None].repeat(len(frames), 1, 1)
+        Ks = intrinsics_from_fov(LENS_PRIOR.assumed_fov, width, height)[None].repeat(len(frames), 1, 1)
     else:
         Ks = clip.Ks[list(frames)]
     ratio = torch.tensor([size[0] / width, size[1] / height, 1.0])

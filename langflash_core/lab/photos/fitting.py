@@ -11,8 +11,8 @@ from PIL import Image
 from torch import Tensor
 
 from langflash_core.geometry.cameras import intrinsics_from_fov
-from langflash_core.images.lens import ASSUMED_FOV
 from langflash_core.images.pictures import Box, centre_box, fitting_size
+from langflash_core.images.settings import LENS_PRIOR
 from langflash_core.images.views import cropped_intrinsics
 from langflash_core.lab.photos.folder import LabelledPhoto
 
@@ -51,7 +51,7 @@ def fitted(
     box = max(left, 0.0), max(top, 0.0), min(right, width), min(bottom, height)  # rounding may lead outside
     pixels = Image.fromarray(photo.image).resize(size, Image.Resampling.LANCZOS, box=box, reducing_gap=3.0)
     rgb = torch.from_numpy(np.array(pixels)).permute(2, 0, 1).contiguous()
-    K = intrinsics_from_fov(ASSUMED_FOV, width, height) if photo.K is None else photo.K
+    K = intrinsics_from_fov(LENS_PRIOR.assumed_fov, width, height) if photo.K is None else photo.K
     K = cropped_intrinsics(K, box, size)
     empty = np.zeros((height, width), dtype=np.float32)
     labels = seen_through(empty.astype(np.int64) if photo.labels is None else photo.labels, box, size)

@@ -10,7 +10,7 @@ from langflash_core.lab.training.parts import PartBatch, joined
 from langflash_core.lab.training.stages.language import phrase_bank
 from langflash_core.lab.training.stages.stage import Loss, Stage, Words, guided
 from langflash_core.network.model import LangFlashNet
-from langflash_core.network.semantics.naming import PLACE
+from langflash_core.network.semantics.settings import PART_NAMING
 
 NOISE = 0.15
 """Of standardised inputs; stands for makes of furniture that are not there to learn from."""
@@ -62,12 +62,12 @@ def _renamed(network: LangFlashNet, room: PartBatch, generator: torch.Generator)
     count, looks = len(inputs), room.looks.shape[1]
     kept = torch.ones_like(inputs)
     kept[:, :looks] = _kept((1, looks), HIDDEN, generator).to(kept)
-    kept[:, looks : looks + PLACE] = (torch.rand(count, 1, generator=generator) >= BLIND).to(kept)
+    kept[:, looks : looks + PART_NAMING.place] = (torch.rand(count, 1, generator=generator) >= BLIND).to(kept)
     known = (torch.rand(count, 1, generator=generator) >= BLIND).to(kept)
-    kept[:, looks + PLACE :] = known
+    kept[:, looks + PART_NAMING.place :] = known
     context = namer.context(inputs * kept)
     context = context * _kept(tuple(context.shape), DROPPED, generator).to(context)
-    typical = namer.mean[looks + PLACE :]  # stands for an atom that is hidden
+    typical = namer.mean[looks + PART_NAMING.place :]  # stands for an atom that is hidden
     return F.normalize(torch.where(known > 0, room.atoms, typical) + namer.out(context).float(), dim=-1)
 
 

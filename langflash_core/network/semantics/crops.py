@@ -11,10 +11,8 @@ from jaxtyping import Float
 from torch import Tensor
 from torch.nn import functional as F
 
-SIDE = 224  # pixels; what CLIP ViT-B/32 sees
-_TAIL = 0.02  # of a group's mass may lie outside its box on every side: stray pixels
-_MARGIN = 0.1  # of the box's longer side is added on every side: things are known by where they stand
-_SMALLEST = 1 / 16  # of the picture's side
+from langflash_core.network.semantics.settings import CROPS
+
 Embed = Callable[[Tensor], Tensor]
 
 
@@ -33,7 +31,7 @@ def crop_atoms(
         _picture(photos[view], group_box(weights[view, k])) for k, view in enumerate(_best_views(weights))
     ]
     if not pictures:
-        return embed(weights.new_zeros(0, 3, SIDE, SIDE))
+        return embed(weights.new_zeros(0, 3, CROPS.side, CROPS.side))
     return F.normalize(embed(torch.stack(pictures)).float(), dim=-1)
 
 
@@ -47,7 +45,7 @@ def group_box(weights: Float[Tensor, "H W"]) -> tuple[float, float, float, float
     left, right = _extent(weights.sum(0))
     top, bottom = _extent(weights.sum(1))
     longest = max((right - left) * width, (bottom - top) * height)
-    half = max(longest * (0.5 + _MARGIN), _SMALLEST * max(width, height) / 2)
+    half = max(longest * (0.5 + CROPS.margin), CROPS.smallest * max(width, height) / 2)
     x, y = (left + right) / 2 * width, (top + bottom) / 2 * height
     return (
         max(x - half, 0) / width, max(y - half, 0) / height,
@@ -59,7 +57,7 @@ def _extent(mass: Tensor) -> tuple[float, float]:
     """Where the mass (n,) along one side begins and ends, in shares of it."""
     shares = mass.double() / mass.double().sum().clamp_min(1e-12)
     until = shares.cumsum(0)
-    inside = ((until > _TAIL) & (until - shares < 1 - _TAIL)).nonzero()
+    inside = ((until > CROPS.tail) & (until - shares < 1 - CROPS.tail)).nonzero()
     if len(inside) == 0:
         return 0.0, 1.0
     return float(inside[0]) / len(mass), (float(inside[-1]) + 1) / len(mass)
@@ -74,5 +72,7 @@ def _picture(photo: Tensor, box: tuple[float, float, float, float]) -> Tensor:
     missing_x, missing_y = max(0, cut.shape[1] - cut.shape[2]), max(0, cut.shape[2] - cut.shape[1])
     pads = (missing_x // 2, missing_x - missing_x // 2, missing_y // 2, missing_y - missing_y // 2)
     square = F.pad(cut[None], pads, mode="replicate")
-    resized = F.interpolate(square, size=(SIDE, SIDE), mode="bicubic", align_corners=False, antialias=True)
+    resized = F.interpolate(
+        square, size=(CROPS.side, CROPS.side), mode="bicubic", align_corners=False, antialias=True
+    )
     return resized[0].clamp(0, 1)

@@ -19,14 +19,12 @@ from langflash_core.network.model import Geometry
 from langflash_core.network.presets import MaskFilter
 from langflash_core.network.semantics.grouping import Groups
 from langflash_core.network.semantics.residual import filtered
+from langflash_core.network.semantics.settings import LIFTING
 from langflash_core.rig.projected import project_points
 
 SURE = MaskFilter(min_score=0.7, min_stability=0.9, offset=1.0, min_area=100, max_overlap=0.7)
 """Between SAM's own values (0.88, 0.95) and the lax ones of the released grouping: a photo of 256
 pixels has few masks, and what is missing falls to the rest."""
-_SAME_DEPTH = 0.05  # of the depth: points further apart are different surfaces
-_SAME_MASK = 0.5  # of the pixels that two masks cover together where both photos see
-_SOFT = 5  # pixels over which a group's border fades: borders of masks are that sure
 
 
 def lifted_weights(
@@ -51,7 +49,7 @@ def lifted_weights(
     hard = F.one_hot(rank[ids], len(order) + 1).movedim(-1, 1).float()  # (V, K, H, W)
     if not bool(hard[:, -1].any()):
         hard = hard[:, :-1]
-    return F.avg_pool2d(hard, _SOFT, stride=1, padding=_SOFT // 2, count_include_pad=False)
+    return F.avg_pool2d(hard, LIFTING.soft, stride=1, padding=LIFTING.soft // 2, count_include_pad=False)
 
 
 def _painted(segments: Sequence[Groups], size: tuple[int, int]) -> tuple[Tensor, list[int]]:
@@ -82,7 +80,7 @@ def _shares(labels: Tensor, total: int, geometry: Geometry, Ks: Tensor) -> dict[
             both += torch.bincount(pairs, minlength=(total + 1) ** 2).view_as(both).cpu()
         covered = both.sum(1)[:, None] + both.sum(0) - both
         likeness = both[:-1, :-1] / covered[:-1, :-1].clamp_min(1)
-        for i, j in (likeness > _SAME_MASK).nonzero().tolist():
+        for i, j in (likeness > LIFTING.same_mask).nonzero().tolist():
             shares[i, j] = float(likeness[i, j])
     return shares
 
@@ -94,7 +92,7 @@ def _looked_up(points: Tensor, geometry: Geometry, Ks: Tensor, view: int) -> tup
     seen = there.inside.nonzero()[:, 0]
     place = there.pixels[seen]
     depths = geometry.depths[view].flatten()[place]
-    same = (there.z[seen] - depths).abs() <= _SAME_DEPTH * depths
+    same = (there.z[seen] - depths).abs() <= LIFTING.same_depth * depths
     return seen[same], place[same]
 
 

@@ -16,16 +16,7 @@ from langflash_core.geometry.cameras import invert_rigid, unproject
 from langflash_core.network.encoders.shared import Tokens
 from langflash_core.network.layers.attention import SelfBlock
 from langflash_core.network.presets import GuidedDepth
-
-PLACE = 10
-"""Numbers that `places` gives of a part."""
-DEEP = 4
-"""Hooks that tell what a thing is, two frozen and two taught; the earlier ones tell one make of it from
-another."""
-_MIN_POINTS = 6
-_VOTERS = 1200
-_LEVEL = 0.6  # a normal within 53 degrees of the camera's own up may be the room's
-_SAME, _NEAR = 0.995, 0.985  # cosines: of normals that vote for each other, and that are averaged
+from langflash_core.network.semantics.settings import PART_NAMING
 
 
 def describe(weights: Float[Tensor, "V K H W"], tokens: Tokens) -> Float[Tensor, "K C"]:
@@ -58,13 +49,13 @@ def upright(pos_c: Float[Tensor, "H W 3"], valid: Bool[Tensor, "H W"]) -> Float[
     whole = valid[1:-1, 2:] & valid[1:-1, :-2] & valid[2:, 1:-1] & valid[:-2, 1:-1]
     normals = F.normalize(torch.linalg.cross(across, along, dim=-1)[whole], dim=-1)
     normals = normals * torch.where(normals[:, 1:2] > 0, -1.0, 1.0)
-    normals = normals[-normals[:, 1] > _LEVEL]
-    if len(normals) < _MIN_POINTS:
+    normals = normals[-normals[:, 1] > PART_NAMING.level]
+    if len(normals) < PART_NAMING.min_points:
         return own
-    normals = normals[:: max(1, len(normals) // _VOTERS)]
+    normals = normals[:: max(1, len(normals) // PART_NAMING.voters)]
     agreement = normals @ normals.T
-    winner = (agreement > _SAME).sum(1).argmax()
-    return F.normalize(normals[agreement[winner] > _NEAR].mean(0), dim=0)
+    winner = (agreement > PART_NAMING.same).sum(1).argmax()
+    return F.normalize(normals[agreement[winner] > PART_NAMING.near].mean(0), dim=0)
 
 
 def places(
@@ -73,8 +64,8 @@ def places(
     viewmats: Float[Tensor, "V 4 4"],
     Ks: Float[Tensor, "V 3 3"],
 ) -> Float[Tensor, "K C"]:
-    """Where each part is and how large, (K, `PLACE`): log width, height and depth (m), heights of its
-    foot and top over the floor (m), place to the side and ahead (m), log share of all pixels, share of
+    """Where each part is and how large, (K, `PART_NAMING.place`): log width, height and depth (m), heights of
+    its foot and top over the floor (m), place to the side and ahead (m), log share of all pixels, share of
     it on a picture's border, and 1; zeros where too little of it is known.
 
     A pixel counts for the part that has most of it. Lengths are those of `depths`, metres as far as
@@ -85,7 +76,7 @@ def places(
             view 0. Ks: (V, 3, 3), pixels of the depths.
     """
     _, parts, height, width = weights.shape
-    answer = weights.new_zeros(parts, PLACE)
+    answer = weights.new_zeros(parts, PART_NAMING.place)
     if parts == 0:
         return answer
     scale = torch.tensor([width / depths.shape[2], height / depths.shape[1], 1.0]).to(Ks)[:, None]
@@ -108,7 +99,7 @@ def places(
     for k in range(parts):
         own = (owner == k) & (weights[:, k] > 0)  # masks may leave pixels to nobody
         points = pos_r[own & valid]
-        if len(points) < _MIN_POINTS:
+        if len(points) < PART_NAMING.min_points:
             continue
         low, high = torch.quantile(points, spread, dim=0)
         numbers = [
@@ -133,7 +124,10 @@ class PartNamer(nn.Module):
 
     def __init__(self, preset: GuidedDepth):
         super().__init__()
-        inputs, dim = DEEP * preset.encoder_dim + PLACE + preset.language_dim, preset.naming_dim
+        inputs, dim = (
+            PART_NAMING.deep * preset.encoder_dim + PART_NAMING.place + preset.language_dim,
+            preset.naming_dim,
+        )
         self.register_buffer("mean", torch.zeros(inputs))
         self.register_buffer("std", torch.ones(inputs))
         self.embed = nn.Linear(inputs, dim)

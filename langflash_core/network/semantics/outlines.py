@@ -22,18 +22,10 @@ from langflash_core.base.resources import weights_folder
 from langflash_core.errors import WeightsError
 from langflash_core.network.semantics.mobile_sam.model import Looked, MobileSam, load_mobile_sam
 from langflash_core.network.semantics.mobile_sam.rough import agreement, box, middle
+from langflash_core.network.semantics.settings import OUTLINING
 
 FILES = ("mobile_sam.safetensors", "mobile_sam_fp16.safetensors", "mobile_sam.pt")
 """Names under which the weights are looked for."""
-SEEN = 512
-"""Pixels of the square that MobileSAM sees."""
-SMALLEST = 24
-"""Pixels of the grid that a group covers in a photo, at least, to be asked for there."""
-SAME = 0.5
-"""IoU with the group's own mask from which an answer means the same thing."""
-SURE = 6.0
-"""Logits are cut there: beyond it no group outvotes another."""
-_AT_ONCE = 16  # prompts; more need more memory and are no quicker on a processor
 
 
 def mobile_sam_checkpoint() -> Path | None:
@@ -48,7 +40,7 @@ class Outlines:
         self.model = model
 
     @staticmethod
-    def installed(device: str, side: int = SEEN) -> "Outlines":
+    def installed(device: str, side: int = OUTLINING.seen) -> "Outlines":
         """With the weights in the user's folder.
 
         Raises:
@@ -78,10 +70,12 @@ class Outlines:
         looked = self.model.look(np.ascontiguousarray(picture))
         labels = F.interpolate(weights[None], picture.shape[:2], mode="bilinear")[0].argmax(0).numpy()
         counts = torch.bincount(weights.argmax(0).flatten(), minlength=len(weights))
-        asked = [k for k in torch.nonzero(counts >= SMALLEST).flatten().tolist() if (labels == k).any()]
+        asked = [
+            k for k in torch.nonzero(counts >= OUTLINING.smallest).flatten().tolist() if (labels == k).any()
+        ]
         logits, same = torch.zeros_like(weights), torch.zeros(len(weights))
-        for start in range(0, len(asked), _AT_ONCE):
-            groups = asked[start : start + _AT_ONCE]
+        for start in range(0, len(asked), OUTLINING.at_once):
+            groups = asked[start : start + OUTLINING.at_once]
             found, agree = self._asked(looked, np.stack([labels == k for k in groups]), weights.shape[1:])
             logits[groups], same[groups] = found, torch.from_numpy(agree).float()
         return outlined(weights, logits, same)
@@ -105,10 +99,12 @@ class Outlines:
 def outlined(
     weights: Float[Tensor, "K H W"], logits: Float[Tensor, "K H W"], same: Float[Tensor, " K"]
 ) -> Float[Tensor, "K H W"]:
-    """softmax_k(log w_k + l_k), l cut at +-`SURE`; groups whose answer is another thing keep l = 0.
+    """softmax_k(log w_k + l_k), l cut at +-`OUTLINING.sure`; groups whose answer is another thing keep l = 0.
 
     Args:
         logits: of masks, above 0 inside. same: IoU of mask and group.
     """
-    told = torch.where((same >= SAME)[:, None, None], logits.clamp(-SURE, SURE), 0.0)
-    return (weights.clamp_min(math.exp(-2 * SURE)).log() + told).softmax(0)
+    told = torch.where(
+        (same >= OUTLINING.same)[:, None, None], logits.clamp(-OUTLINING.sure, OUTLINING.sure), 0.0
+    )
+    return (weights.clamp_min(math.exp(-2 * OUTLINING.sure)).log() + told).softmax(0)

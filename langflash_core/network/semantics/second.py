@@ -18,17 +18,7 @@ from torch.nn import functional as F
 
 from langflash_core.network.encoders.others import CHANNELS, OtherEyes
 from langflash_core.network.presets import GuidedDepth
-
-COUNTS = 1.5
-"""What they count beside an atom, whose length is 1; what they say is as long as its pixels agree
-(MEASURED.md)."""
-STEEPNESS = 10.0
-"""Of what tells photos from rooms, so that it learns as fast as the words do: channels that tell them apart
-are many and faint."""
-TOGETHER = 2.0
-"""A scene's pixels tell together what they show this much more surely than each alone."""
-PHOTOS = 3.0
-"""Scenes of photos for one of rendered pictures, before anything was seen."""
+from langflash_core.network.semantics.settings import OPINION
 
 
 class SecondHead(nn.Module):
@@ -53,7 +43,7 @@ class SecondHead(nn.Module):
 
     def photo_odds(self, maps: Float[Tensor, "... F"]) -> Float[Tensor, "..."]:
         """Log odds that pixels are a photo's, not a rendered room's."""
-        return STEEPNESS * self.photo(maps)[..., 0]
+        return OPINION.steepness * self.photo(maps)[..., 0]
 
     @property
     def silent(self) -> bool:
@@ -83,9 +73,9 @@ def looked_at(
         total = total + own.flatten(1) @ head(maps)
         odds = odds + head.photo_odds(maps).mean() / len(weights)
     means = total / (weights.sum((0, 2, 3))[:, None] + 1e-6)
-    return (TOGETHER * odds + math.log(PHOTOS)).sigmoid() * means
+    return (OPINION.together * odds + math.log(OPINION.photos)).sigmoid() * means
 
 
 def both(first: Float[Tensor, "K C"], second: Float[Tensor, "K C"]) -> Float[Tensor, "K C"]:
     """Atoms (K, C) of unit norm: what both say. second: of `looked_at`."""
-    return F.normalize(first + COUNTS * second, dim=-1)
+    return F.normalize(first + OPINION.counts * second, dim=-1)

@@ -22,11 +22,7 @@ from torch.nn import functional as F
 from langflash_core.base.many import groups_of, held, in_groups, together
 from langflash_core.network.presets import Splitting
 from langflash_core.network.prior import resize
-
-_ITERATIONS = 6
-_DIRECTIONS = 32
-_WHOLE = 16  # views, all pixels of which are looked at for parts; of more, as many pixels
-_SEEDS_FROM = 1500  # pixels; enough to seed from, and seeding is the only serial step
+from langflash_core.network.semantics.settings import SPLITTING
 
 
 def split_groups(
@@ -81,7 +77,7 @@ def split_maps(
     """`split_groups` of V views whose joint maps (v, S, h, w) come group by group, each as often as it is
     asked for. Of many views the parts are found in some of their pixels, and the answer is held in half
     precision."""
-    step = -(-num_views // _WHOLE)
+    step = -(-num_views // SPLITTING.whole)
     coarse = []
     for group in groups:
         small = F.avg_pool2d(group(), 2, ceil_mode=True).movedim(1, -1).flatten(0, 2)  # (X, S)
@@ -97,14 +93,14 @@ def split_maps(
 
 
 def condensed(features: Float[Tensor, "V C h w"]) -> Float[Tensor, "V D h w"]:
-    """Maps (V, C, h, w) in the few directions that a scene needs, (V, `_DIRECTIONS`, h, w) float32:
+    """Maps (V, C, h, w) in the few directions that a scene needs, (V, `SPLITTING.directions`, h, w) float32:
     clustering then takes a fifth of the time, and cosines stay.
 
     Source: Halko, Martinsson and Tropp 2011 (randomised range finder, one power iteration).
     """
-    if features.shape[1] <= _DIRECTIONS:
+    if features.shape[1] <= SPLITTING.directions:
         return features
-    drawn = torch.randn(features.shape[1], _DIRECTIONS, generator=torch.Generator().manual_seed(0))
+    drawn = torch.randn(features.shape[1], SPLITTING.directions, generator=torch.Generator().manual_seed(0))
     basis = drawn.to(features.device)
     for _ in range(2):
         basis = torch.linalg.qr(_powered(features, basis)).Q
@@ -141,7 +137,7 @@ def cluster(vectors: Float[Tensor, "X S"], rule: Splitting) -> Float[Tensor, "J 
 def _seeds(vectors: Tensor, count: int) -> Tensor:
     """Up to `count` of the vectors, each drawn with the squared distance to those before it."""
     generator = torch.Generator().manual_seed(0)
-    some = vectors[:: max(1, len(vectors) // _SEEDS_FROM)]
+    some = vectors[:: max(1, len(vectors) // SPLITTING.seeds_from)]
     distances = torch.full_like(some[:, 0], torch.inf)
     chosen = [0]
     while len(chosen) < min(count, len(some)):
@@ -154,7 +150,7 @@ def _seeds(vectors: Tensor, count: int) -> Tensor:
 def _settle(vectors: Tensor, centres: Tensor) -> tuple[Tensor, Tensor]:
     """Lloyd iterations: unit centres (J, S) and how many vectors each has; empty ones stay put."""
     counts = torch.zeros(len(centres))
-    for _ in range(_ITERATIONS):
+    for _ in range(SPLITTING.iterations):
         nearest = (vectors @ centres.T).argmax(1)
         counts = torch.bincount(nearest, minlength=len(centres))
         sums = torch.zeros_like(centres).index_add_(0, nearest, vectors)

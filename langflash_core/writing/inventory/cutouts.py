@@ -13,11 +13,7 @@ from langflash_core.base.running import Progress
 from langflash_core.inventory.things import Inventory
 from langflash_core.segments import carrying, segmented_view
 from langflash_core.writing.renderers import Renderer
-
-SIDE = 220  # pixels of the longer side, at most
-_MARGIN = 0.08  # of the thing's longer side, around it
-_QUALITY = 82
-_LEAST = 0.5  # of a pixel that is the thing's
+from langflash_core.writing.settings import CUTOUTS
 
 
 def cutouts_of(found: Inventory, renderer: Renderer, progress: Progress) -> dict[str, str]:
@@ -54,12 +50,12 @@ def _cut_out(photo: np.ndarray, matte: torch.Tensor) -> Image.Image | None:
     """The thing on transparency, cropped; None where no pixel is mostly its own."""
     height, width = photo.shape[:2]
     alpha = F.interpolate(matte[None, None], (height, width), mode="bilinear", align_corners=False)[0, 0]
-    rows, columns = (alpha >= _LEAST).nonzero(as_tuple=True)
+    rows, columns = (alpha >= CUTOUTS.least).nonzero(as_tuple=True)
     if not len(rows):
         return None
     left, top = int(columns.min()), int(rows.min())
     right, bottom = int(columns.max()) + 1, int(rows.max()) + 1
-    margin = round(_MARGIN * max(right - left, bottom - top))
+    margin = round(CUTOUTS.margin * max(right - left, bottom - top))
     box = (
         max(0, left - margin),
         max(0, top - margin),
@@ -69,11 +65,11 @@ def _cut_out(photo: np.ndarray, matte: torch.Tensor) -> Image.Image | None:
     soft = ((alpha - 0.25) / 0.5).clamp(0, 1)
     picture = np.dstack((photo, (soft * 255).round().byte().numpy()))
     cut = Image.fromarray(picture, "RGBA").crop(box)
-    cut.thumbnail((SIDE, SIDE), Image.Resampling.LANCZOS)
+    cut.thumbnail((CUTOUTS.side, CUTOUTS.side), Image.Resampling.LANCZOS)
     return cut
 
 
 def _url(picture: Image.Image) -> str:
     stream = io.BytesIO()
-    picture.save(stream, "WEBP", quality=_QUALITY)
+    picture.save(stream, "WEBP", quality=CUTOUTS.quality)
     return f"data:image/webp;base64,{base64.b64encode(stream.getvalue()).decode()}"

@@ -13,15 +13,8 @@ from html import escape
 from langflash_core.inventory.plan import Opening, Place, Plan, PlanWall
 from langflash_core.inventory.things import Thing
 from langflash_core.writing.inventory.words import doubt_of, scale_note, size
+from langflash_core.writing.settings import PAPER
 
-SCALES = (10, 20, 25, 50, 100, 200, 500)
-"""1 to so many, on paper."""
-_ROOM = (118.0, 150.0)  # mm for the drawing itself: with its list it fits on A4
-_EDGE, _TOP, _LIST = 14.0, 20.0, 62.0  # mm around it, above it, and for the list
-_ROW = 7.4  # mm of the list
-_WALL, _THIN = 1.5, 0.25  # mm of lines
-_HANGS = 0.7  # of the height of its top, from which its lower end is over what stands below
-_BADGE = 1.9  # mm, radius
 _STYLE = """
 .plan text { font-family: 'Helvetica Neue', Helvetica, Arial, sans-serif; fill: #1d2126; }
 .plan .wall { stroke: #1d2126; stroke-width: 1.5; stroke-linecap: square; fill: none; }
@@ -52,7 +45,9 @@ class _Paper:
     north: float
 
     def at(self, place: Place) -> tuple[float, float]:
-        return _EDGE + (place[0] - self.west) * self.per, _TOP + _EDGE + (self.north - place[1]) * self.per
+        return PAPER.edge + (place[0] - self.west) * self.per, PAPER.top + PAPER.edge + (
+            self.north - place[1]
+        ) * self.per
 
 
 def plan_svg(plan: Plan, title: str, *, headed: bool = True) -> str:
@@ -60,13 +55,14 @@ def plan_svg(plan: Plan, title: str, *, headed: bool = True) -> str:
     (west, south), (east, north) = plan.bounds
     wide, high = max(east - west, 1e-3), max(north - south, 1e-3)
     ratio = next(
-        (r for r in SCALES if 1000 / r * wide <= _ROOM[0] and 1000 / r * high <= _ROOM[1]), SCALES[-1]
+        (r for r in PAPER.scales if 1000 / r * wide <= PAPER.room[0] and 1000 / r * high <= PAPER.room[1]),
+        PAPER.scales[-1],
     )
-    per = 1000 / ratio if plan.unit == "m" else min(_ROOM[0] / wide, _ROOM[1] / high)
+    per = 1000 / ratio if plan.unit == "m" else min(PAPER.room[0] / wide, PAPER.room[1] / high)
     paper = _Paper(per, west, north)
     listed = [*plan.things, *(opening.thing for opening in plan.openings)]
-    width = 2 * _EDGE + wide * per + (_LIST if listed else 0)
-    height = _TOP + max(2 * _EDGE + high * per + 10, _EDGE + 6 + _ROW * len(listed))
+    width = 2 * PAPER.edge + wide * per + (PAPER.list if listed else 0)
+    height = PAPER.top + max(2 * PAPER.edge + high * per + 10, PAPER.edge + 6 + PAPER.row * len(listed))
     skipped = 0.0 if headed else 12.0  # where the title would be
     width, height = max(width, 110.0), height + 6 - skipped
     said = f"1 : {ratio}" if plan.unit == "m" else "not to scale: nobody told a length"
@@ -75,8 +71,8 @@ def plan_svg(plan: Plan, title: str, *, headed: bool = True) -> str:
         f'viewBox="0 {skipped} {width:.1f} {height:.1f}" class="plan" role="img">',
         f"<title>Floor plan of {escape(title)}</title><style>{_STYLE}</style>",
         f'<rect y="{skipped}" width="{width:.1f}" height="{height:.1f}" fill="#fff"/>',
-        f'<text class="title" x="{_EDGE}" y="12">{escape(title)}</text>' if headed else "",
-        f'<text class="note" x="{_EDGE}" y="17">Floor plan, {said}. '
+        f'<text class="title" x="{PAPER.edge}" y="12">{escape(title)}</text>' if headed else "",
+        f'<text class="note" x="{PAPER.edge}" y="17">Floor plan, {said}. '
         f"{escape(scale_note(plan.guess, plan.unit))}</text>",
         *(_thing(paper, thing, doubt_of(thing, plan)) for thing in sorted(plan.things, key=_area)),
         *(_wall(paper, wall) for wall in plan.walls),
@@ -84,10 +80,10 @@ def plan_svg(plan: Plan, title: str, *, headed: bool = True) -> str:
         *(_badge(number + 1, place) for number, place in enumerate(_spread(paper, plan.things))),
         *(_eye(paper, eye, number) for number, eye in enumerate(plan.eyes)),
         *_sizes(paper, plan),
-        _list(plan, 2 * _EDGE + wide * per, listed),
-        _bar(paper, plan, _TOP + 2 * _EDGE + high * per + 4),
-        _stood(plan, _TOP + 2 * _EDGE + high * per + 10),
-        _arrow(2 * _EDGE + wide * per - 6, _TOP + 4),
+        _list(plan, 2 * PAPER.edge + wide * per, listed),
+        _bar(paper, plan, PAPER.top + 2 * PAPER.edge + high * per + 4),
+        _stood(plan, PAPER.top + 2 * PAPER.edge + high * per + 10),
+        _arrow(2 * PAPER.edge + wide * per - 6, PAPER.top + 4),
         "</svg>",
     ]
     return "\n".join(part for part in parts if part)
@@ -106,7 +102,7 @@ def _area(thing: Thing) -> float:
 
 def _thing(paper: _Paper, thing: Thing, doubt: str) -> str:
     """Its outline; dashed where it hangs above heads, grey where it is doubted."""
-    hangs = thing.bottom > _HANGS * max(1e-6, abs(thing.bottom) + thing.size[2])
+    hangs = thing.bottom > PAPER.hangs * max(1e-6, abs(thing.bottom) + thing.size[2])
     kind = "high" if hangs else "unsure" if doubt else "thing"
     points = " ".join(f"{x:.2f},{y:.2f}" for x, y in (paper.at((e, n)) for e, n in thing.corners.tolist()))
     title = f"<title>{escape(thing.title)}{f': {doubt}' if doubt else ''}</title>"
@@ -123,7 +119,7 @@ def _spread(paper: _Paper, things: Sequence[Thing]) -> list[tuple[float, float]]
             for ring in (2.0, 4.0, 6.0, 8.0)
             for angle in (k * math.pi / 4 for k in range(8))
         ]
-        free = (way for way in ways if all(math.dist(way, other) >= 2.15 * _BADGE for other in chosen))
+        free = (way for way in ways if all(math.dist(way, other) >= 2.15 * PAPER.badge for other in chosen))
         chosen.append(next(free, (x, y)))
     return chosen
 
@@ -131,7 +127,7 @@ def _spread(paper: _Paper, things: Sequence[Thing]) -> list[tuple[float, float]]
 def _badge(number: int, place: tuple[float, float]) -> str:
     x, y = place
     return (
-        f'<circle class="badge" cx="{x:.2f}" cy="{y:.2f}" r="{_BADGE}"/>'
+        f'<circle class="badge" cx="{x:.2f}" cy="{y:.2f}" r="{PAPER.badge}"/>'
         f'<text class="number" x="{x:.2f}" y="{y + 0.8:.2f}">{number}</text>'
     )
 
@@ -205,10 +201,10 @@ def _sizes(paper: _Paper, plan: Plan) -> list[str]:
 def _list(plan: Plan, left: float, listed: list[Thing]) -> str:
     rows = []
     for number, thing in enumerate(listed):
-        y = _TOP + _EDGE + _ROW * number
+        y = PAPER.top + PAPER.edge + PAPER.row * number
         badge = number + 1 if number < len(plan.things) else ""
         mark = (
-            f'<circle class="badge" cx="{left:.1f}" cy="{y:.2f}" r="{_BADGE}"/>'
+            f'<circle class="badge" cx="{left:.1f}" cy="{y:.2f}" r="{PAPER.badge}"/>'
             f'<text class="number" x="{left:.1f}" y="{y + 0.8:.2f}">{badge}</text>'
             if badge
             else ""
@@ -225,7 +221,7 @@ def _bar(paper: _Paper, plan: Plan, y: float) -> str:
     """A length to compare with."""
     if plan.unit != "m":
         return ""
-    x, full = _EDGE, paper.per
+    x, full = PAPER.edge, paper.per
     halves = [
         f'<rect x="{x + k * full / 2:.2f}" y="{y:.2f}" width="{full / 2:.2f}" height="1.1" '
         f'fill="{"#1d2126" if k % 2 == 0 else "#fff"}" stroke="#1d2126" stroke-width=".15"/>'
@@ -239,8 +235,8 @@ def _stood(plan: Plan, y: float) -> str:
     said = ["where the photos were taken"] * bool(plan.eyes)
     said += ["dashed: perhaps no wall"] * any(wall.doubt for wall in plan.walls)
     said += ["grey, ?: in doubt"] * any(doubt_of(thing, plan) for thing in plan.things)
-    dot = f'<circle class="eye" cx="{_EDGE + 0.7}" cy="{y:.2f}" r=".7"/>' if plan.eyes else ""
-    x = _EDGE + (2.5 if plan.eyes else 0.0)
+    dot = f'<circle class="eye" cx="{PAPER.edge + 0.7}" cy="{y:.2f}" r=".7"/>' if plan.eyes else ""
+    x = PAPER.edge + (2.5 if plan.eyes else 0.0)
     return dot + f'<text class="note" x="{x}" y="{y + 0.9:.2f}">{"; ".join(said)}</text>' if said else ""
 
 

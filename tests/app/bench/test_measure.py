@@ -8,9 +8,8 @@ import torch
 from app.bench import measure
 from app.bench.cases import in_float64
 from app.bench.errors import View, errors_of, true_view
-from app.bench.modes import DEFAULT, MODES, Mode, modes_for
+from app.bench.modes import MODES, Mode, modes_for
 from app.bench.paths import Path
-from app.gl.splats import SplatBuffers
 from langflash_core.splat import render
 from tests.app.bench.conftest import silent, small_case
 from tests.app.gl.questions import full_relevance
@@ -23,12 +22,12 @@ def rows(context):
     """(times, errors) of every mode, by name."""
     case = small_case()
     with context:  # current, whoever else drew in between
-        result = measure(context, case, modes_for(context, case.scene), silent)
+        result = measure(context, case, modes_for(case.scene), silent)
     return {mode.name: (times, errors) for mode, times, errors in result.rows}
 
 
 def test_every_mode_is_measured_on_every_frame(rows):
-    assert set(rows) >= {mode.name for mode in MODES} - {"shader queries"}
+    assert set(rows) == {mode.name for mode in MODES}
     for name, (times, _) in rows.items():
         for samples in (times.frames, times.cpu, times.answers, times.phrases):
             expected = 0 if name == "fast relevance" and samples is times.answers else 2  # it has no maps
@@ -60,45 +59,9 @@ def test_the_fast_mode_is_near_but_not_exact(rows):
     assert min(rows["fast relevance"][0].cpu) < min(rows["default"][0].cpu)
 
 
-def test_shaders_answer_as_the_processor_does(rows):
-    if "shader queries" not in rows:
-        pytest.skip("the default asks in shaders here")
-    default, other = rows["default"][1], rows["shader queries"][1]
-    assert other.psnr == default.psnr
-    # The same maps, packed to sixteen bits or as they are: 1e-5 of a cosine, temperature / 4 of it.
-    assert abs(other.relevance_mean - default.relevance_mean) <= 3e-5
-    assert abs(other.relevance_max - default.relevance_max) <= 1e-4
-
-
 def test_halves_lose_something(rows):
     for name in ("half resolution", "quarter of Gaussians"):
         assert rows[name][1].psnr < rows["default"][1].psnr - 10
-
-
-class _FarOverNear(SplatBuffers):
-    def sort(self, camera):
-        super().sort(camera)
-        self.draw_in(self.order[::-1])
-
-
-def test_a_mode_that_is_wrong_shows_it(gl, case):
-    wrong = Mode("sort", "far over near", splats=_FarOverNear)
-    result = measure(gl, case, (DEFAULT, wrong), silent)
-    (_, _, right), (_, _, broken) = result.rows
-    assert broken.psnr < right.psnr - 20
-    assert broken.relevance_mean > 100 * right.relevance_mean
-    assert broken.mask_iou is not None and broken.mask_iou < 0.95
-
-
-def test_a_stale_order_is_right_while_the_camera_stands(gl, case):
-    """But for Gaussians that are as deep to a step of the quick order; what moves is drawn far worse."""
-    stale = next(mode for mode in MODES if mode.axis == "sort")
-    late = []
-    for cameras in (case.path.cameras[:1] * 3, case.path.cameras[::2] * 2):
-        moved = dataclasses.replace(case, path=Path(cameras, "by hand"))
-        late.append(measure(gl, moved, (DEFAULT, stale), silent).rows[1][2].psnr)
-    standing, moving = late
-    assert standing > moving + 10
 
 
 def test_all_weights_are_the_scene_itself(gl, case):
@@ -108,7 +71,7 @@ def test_all_weights_are_the_scene_itself(gl, case):
     assert fewer.weight_values.shape == (400, 2)
     assert torch.allclose(fewer.weight_values.sum(-1), torch.ones(400))
     assert torch.equal(fewer.weight_ids[:, 0], case.scene.semantics.weight_ids[:, 0])
-    assert [mode.kept for mode in modes_for(gl, fewer_scene(case, 4)) if mode.axis == "weights"] == [1, 2]
+    assert [mode.kept for mode in modes_for(fewer_scene(case, 4)) if mode.axis == "weights"] == [1, 2]
 
 
 def fewer_scene(case, kept):
@@ -116,11 +79,8 @@ def fewer_scene(case, kept):
 
 
 def test_only_the_axes_asked_for(gl, case):
-    assert [mode.name for mode in modes_for(gl, case.scene, ["sort", "precision"])] == [
-        "default",
-        "float32",
-        "stale sort",
-    ]
+    asked = modes_for(case.scene, ["precision", "relevance"])
+    assert [mode.name for mode in asked] == ["default", "float32", "fast relevance"]
 
 
 def test_the_default_must_come_first(gl, case):
@@ -130,14 +90,14 @@ def test_the_default_must_come_first(gl, case):
 
 def test_a_picture_of_one_pixel(gl, case):
     tiny = dataclasses.replace(case, path=Path(tuple(c.resized(1, 1) for c in case.path.cameras), "by hand"))
-    for mode, times, errors in measure(gl, tiny, modes_for(gl, case.scene, ["resolution"]), silent).rows:
+    for mode, times, errors in measure(gl, tiny, modes_for(case.scene, ["resolution"]), silent).rows:
         assert len(times.frames) == 2 and 0 <= errors.relevance_max <= 1, mode.name
 
 
 def test_nothing_is_left_behind(gl, case):
-    measure(gl, case, modes_for(gl, case.scene), silent)
+    measure(gl, case, modes_for(case.scene), silent)
     before = living(gl)
-    measure(gl, case, modes_for(gl, case.scene), silent)
+    measure(gl, case, modes_for(case.scene), silent)
     assert living(gl) == before
 
 

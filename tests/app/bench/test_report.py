@@ -19,7 +19,7 @@ from tests.app.bench.conftest import silent, small_case
 def measured(context) -> dict:
     case = small_case()
     with context:  # current, whoever else drew in between
-        results = [measure(context, case, modes_for(context, case.scene), silent)]
+        results = [measure(context, case, modes_for(case.scene), silent)]
         return document(machine(context), results)
 
 

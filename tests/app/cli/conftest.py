@@ -43,6 +43,11 @@ def run(capsys):
     return command
 
 
+def pixels(path: Path) -> np.ndarray:
+    """Of a picture file."""
+    return np.asarray(Image.open(path))
+
+
 def stripes() -> Scene:
     """A wall one unit ahead: left third one word, middle the next, right the last."""
     ys, xs = torch.meshgrid(torch.linspace(-0.6, 0.6, 42), torch.linspace(-0.8, 0.8, 56), indexing="ij")

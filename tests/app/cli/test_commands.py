@@ -7,6 +7,7 @@ import signal
 import subprocess
 import sys
 import time
+from argparse import Namespace
 from dataclasses import replace
 from pathlib import Path
 
@@ -15,18 +16,17 @@ import pytest
 import torch
 from PIL import Image
 
+import app.window
 import langflash_core
+from app.cli.commands import view
 from langflash_core.base.pictures import PICTURES
+from langflash_core.errors import ImageError
 from langflash_core.scene.file import load, save
 from langflash_core.splat import render
 from langflash_core.types import Camera
-from tests.app.cli.conftest import HEIGHT, WIDTH, WORDS, stripes
+from tests.app.cli.conftest import HEIGHT, WIDTH, WORDS, pixels, stripes
 
 TORCH = ("--backend", "torch")
-
-
-def pixels(path: Path) -> np.ndarray:
-    return np.asarray(Image.open(path))
 
 
 @pytest.mark.parametrize("backend", ["torch", "gl"])
@@ -558,6 +558,18 @@ def test_window_needs_a_display(scene_file, tmp_path):
     assert done.stderr.startswith("langflash: ") and done.stderr.count("\n") == 1
     missing = subprocess.run([*words, "gone.jpg"], capture_output=True, text=True, env=hidden, timeout=60)
     assert missing.returncode == 2 and "gone.jpg" in missing.stderr
+
+
+def test_the_window_opens_a_folder_as_its_photos(tmp_path, monkeypatch):
+    opened = []
+    monkeypatch.setattr(app.window, "run", lambda paths: opened.append(paths) or 0)
+    photos = [tmp_path / name for name in ("a.png", "b.png")]
+    for path in (*photos, tmp_path / "notes.txt"):
+        path.write_bytes(b"-")
+    assert view.run(Namespace(paths=[tmp_path]), io.StringIO()) == 0 and opened == [photos]
+    (tmp_path / "empty").mkdir()
+    with pytest.raises(ImageError, match="holds no photos"):
+        view.run(Namespace(paths=[tmp_path / "empty"]), io.StringIO())
 
 
 def test_heat_maps_are_coloured_as_asked(run, scene_file, tmp_path):

@@ -8,7 +8,7 @@ import pytest
 from langflash_core import pipeline
 from langflash_core.base.resources import asset_path
 from langflash_core.errors import ImageError
-from langflash_core.images.pictures import MAX_PHOTOS
+from langflash_core.images.settings import PHOTO_LIMITS
 
 PHOTO = asset_path("photos/books_left.jpg")
 
@@ -60,7 +60,11 @@ def test_nothing_usable(run, taken, folder, tmp_path):
 
 
 def test_more_photos_than_a_scene_takes(run, taken, folder, tmp_path):
-    for number in range(MAX_PHOTOS + 1):
+    for number in range(PHOTO_LIMITS.max_photos + 1):
         (folder / f"{number:03}.jpg").touch()
     outcome = run("reconstruct", folder, "-o", tmp_path / "a.langflash")
-    assert outcome.code == 2 and not taken and f"{MAX_PHOTOS + 1} photos are too many" in outcome.err
+    assert (
+        outcome.code == 2
+        and not taken
+        and f"{PHOTO_LIMITS.max_photos + 1} photos are too many" in outcome.err
+    )

@@ -13,7 +13,8 @@ import pytest
 from PIL import Image
 
 from langflash_core.images.film import Reader
-from langflash_core.images.pictures import MAX_PHOTOS, photo_names
+from langflash_core.images.pictures import photo_names
+from langflash_core.images.settings import PHOTO_LIMITS
 from langflash_core.images.still_names import is_still
 from tests import films
 
@@ -107,9 +108,9 @@ def test_films_beside_photos_share_the_room(walk: Path, tmp_path: Path) -> None:
     def silent(stage: str, fraction: float) -> None:
         pass
 
-    photos = [tmp_path / f"{number}.jpg" for number in range(MAX_PHOTOS - 5)]
+    photos = [tmp_path / f"{number}.jpg" for number in range(PHOTO_LIMITS.max_photos - 5)]
     taken, told, _ = with_frames([photos[0], walk, *photos[1:]], silent)
-    assert len(taken) == MAX_PHOTOS and taken[0] == photos[0] and told[0]["chosen"] == 5
+    assert len(taken) == PHOTO_LIMITS.max_photos and taken[0] == photos[0] and told[0]["chosen"] == 5
     assert photo_names(taken)[1].startswith("walk.mp4 @ ")
 
 

@@ -10,14 +10,10 @@ import pytest
 import trimesh
 from PIL import Image
 
-from tests.app.cli.conftest import HEIGHT, WIDTH, stripes
+from tests.app.cli.conftest import HEIGHT, WIDTH, pixels, stripes
 
 TORCH = ("--backend", "torch")
 ASKED = ("--prompt", "armchair", "floor lamp", "submarine")
-
-
-def pixels(path: Path) -> np.ndarray:
-    return np.asarray(Image.open(path))
 
 
 def files_of(folder: Path) -> dict[str, bytes]:

@@ -10,7 +10,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
-from PIL import Image
 
 from app.window.scene.drops import SCENE_SUFFIXES
 from langflash_core.base.outputs import ALL_OUT
@@ -19,7 +18,7 @@ from langflash_core.export.language import side_car
 from langflash_core.language.spaces import language_space
 from langflash_core.scene.file import save
 from langflash_core.types import Scene
-from tests.app.cli.conftest import HEIGHT, WIDTH, WORDS, stripes
+from tests.app.cli.conftest import HEIGHT, WIDTH, WORDS, pixels, stripes
 from tests.app.gl.test_gl_layers import layered
 from tests.export.pages import read_page
 from tests.export.splats import damaged_files
@@ -50,10 +49,6 @@ def refused(run, tmp_path):
         return outcome.err
 
     return check
-
-
-def pixels(path: Path) -> np.ndarray:
-    return np.asarray(Image.open(path))
 
 
 def test_the_suffixes_of_commands_are_those_of_the_core():

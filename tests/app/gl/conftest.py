@@ -9,8 +9,13 @@ from app.gl.processor.host import HostAnswers
 
 
 @pytest.fixture(params=["float16", "float32"])
-def renderer(gl, request):
-    made = SplatRenderer(gl, request.param)
+def precision(request):
+    return request.param
+
+
+@pytest.fixture
+def renderer(gl, precision):
+    made = SplatRenderer(gl, precision)
     yield made
     made.release()
 

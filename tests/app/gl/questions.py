@@ -1,12 +1,25 @@
-"""Queries without a text tower, and numbers that compare pictures."""
+"""Queries without a text tower, pictures of a renderer made for them, and numbers that compare them."""
 
 import math
 
+import moderngl
 import torch
 from torch.nn.functional import normalize
 
+from app.gl import SplatRenderer
+from app.gl.canvas import Precision
 from langflash_core.language.relevance import CompiledQuery, reduce_dictionary
-from langflash_core.types import Scene
+from langflash_core.types import Camera, Frame, Scene
+
+
+def draw(gl: moderngl.Context, precision: Precision, scene: Scene, seen: Camera, **options) -> Frame:
+    """With its weight maps, by a renderer of its own."""
+    renderer = SplatRenderer(gl, precision)
+    renderer.set_scene(scene)
+    renderer.draw(seen, **options)
+    frame = renderer.frame(weight_maps=True)
+    renderer.release()
+    return frame
 
 
 def question(

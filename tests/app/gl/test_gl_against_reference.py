@@ -10,7 +10,7 @@ from app.gl import SplatRenderer
 from app.gl.layout import ATOMS_A_LAYER, ATOMS_A_PASS
 from langflash_core.language.relevance import relevance_maps
 from langflash_core.splat import render
-from tests.app.gl.questions import full_relevance, psnr, question
+from tests.app.gl.questions import draw, full_relevance, psnr, question
 from tests.splat.scenes import camera, cloud, maps_of, parallel, scene_of, splats, turned
 
 # float16 keeps 11 bits, 5e-4 of a value, and back-to-front blending rounds once a layer while
@@ -23,20 +23,6 @@ RELEVANCE_ERROR = {"float16": 2e-3, "float32": 1e-4}  # mean; ten times the slop
 
 
 pytestmark = pytest.mark.usefixtures("queries")
-
-
-@pytest.fixture(params=["float16", "float32"])
-def precision(request):
-    return request.param
-
-
-def draw(gl, precision, scene, seen, **options):
-    renderer = SplatRenderer(gl, precision)
-    renderer.set_scene(scene)
-    renderer.draw(seen, **options)
-    frame = renderer.frame(weight_maps=True)
-    renderer.release()
-    return frame
 
 
 def assert_agrees(frame, expected, precision):

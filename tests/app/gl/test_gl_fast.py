@@ -7,7 +7,8 @@ import torch
 
 from app.gl import SplatRenderer
 from app.gl.fast import MAX_PHRASES
-from langflash_core.language.relevance import EMPTY_NORM, CompiledQuery
+from langflash_core.language.relevance import CompiledQuery
+from langflash_core.language.settings import RELEVANCE
 from langflash_core.splat import render
 from langflash_core.types import Camera, Scene, Semantics
 from tests.app.gl.questions import full_relevance, question
@@ -28,9 +29,9 @@ def twin(scene: Scene, compiled: CompiledQuery, seen: Camera) -> torch.Tensor:
     ids = torch.arange(numbers.shape[1]).expand(numbers.shape)
     carried = Semantics(ids, numbers, torch.eye(numbers.shape[1], 16, dtype=torch.float64), "test")
     sums = maps_of(render(replace(scene, semantics=carried), seen)).double()
-    shares = sums[..., 1:] / sums[..., :1].clamp_min(EMPTY_NORM)
+    shares = sums[..., 1:] / sums[..., :1].clamp_min(RELEVANCE.empty_norm)
     values = torch.sigmoid(compiled.temperature * shares) if compiled.mode == "relevancy" else shares
-    return torch.where(sums[..., :1] < EMPTY_NORM, 0.0, values).movedim(-1, 0)
+    return torch.where(sums[..., :1] < RELEVANCE.empty_norm, 0.0, values).movedim(-1, 0)
 
 
 @pytest.mark.parametrize("precision", ["float16", "float32"])

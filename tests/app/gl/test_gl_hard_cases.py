@@ -24,10 +24,11 @@ from app.gl import SplatRenderer, offscreen_context
 from app.gl.splats import SplatBuffers
 from langflash_core.errors import GraphicsError
 from langflash_core.geometry.harmonics import SH_C0
-from langflash_core.language.relevance import EMPTY_NORM, CompiledQuery
+from langflash_core.language.relevance import CompiledQuery
+from langflash_core.language.settings import RELEVANCE
 from langflash_core.splat import render, view_depths
 from langflash_core.types import Camera, Frame, Gaussians, Scene, Semantics
-from tests.app.gl.questions import full_relevance, question
+from tests.app.gl.questions import draw, full_relevance, question
 from tests.splat.scenes import camera, cloud, maps_of, scene_of, splats, turned
 
 pytestmark = pytest.mark.usefixtures("queries")
@@ -39,11 +40,6 @@ CUT = 1.001 / 255
 RED, GREEN, BLUE = (1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 
 
-@pytest.fixture(params=["float16", "float32"])
-def precision(request):
-    return request.param
-
-
 def within(what: str, error: torch.Tensor | float, limit: float) -> None:
     """One measured error and its limit."""
     assert float(error) <= limit, f"{what}: {float(error):.2e} is above {limit:.2e}"
@@ -51,15 +47,6 @@ def within(what: str, error: torch.Tensor | float, limit: float) -> None:
 
 def largest(left: torch.Tensor, right: torch.Tensor) -> torch.Tensor:
     return (left.double() - right.double()).abs().max() if left.numel() else torch.zeros(())
-
-
-def draw(gl, precision, scene: Scene, seen: Camera, **options) -> Frame:
-    renderer = SplatRenderer(gl, precision)
-    renderer.set_scene(scene)
-    renderer.draw(seen, **options)
-    frame = renderer.frame(weight_maps=True)
-    renderer.release()
-    return frame
 
 
 class Watched:
@@ -579,13 +566,13 @@ NONE = torch.zeros(0, 4)
 AXES = torch.eye(4)
 
 
-@pytest.mark.parametrize("length", [0.0, 0.9 * EMPTY_NORM, 1.1 * EMPTY_NORM, 1e-3])
+@pytest.mark.parametrize("length", [0.0, 0.9 * RELEVANCE.empty_norm, 1.1 * RELEVANCE.empty_norm, 1e-3])
 def test_a_vector_shorter_than_epsilon_has_no_relevance(gl, precision, length):
     scene = wall([1.0], length / 0.99 * AXES[:1])
     texts = torch.tensor([[0.6, 0.8, 0.0, 0.0]])
     for negatives in (NONE, AXES[2:3]):
         relevance, truth = asked(gl, precision, scene, phrases(scene, texts, negatives, 10.0))
-        assert (relevance == 0).all() == (length < EMPTY_NORM) == (truth == 0).all()
+        assert (relevance == 0).all() == (length < RELEVANCE.empty_norm) == (truth == 0).all()
         within("relevance", largest(relevance, truth), 1e-6)  # W cancels out of a single atom's cosine
 
 

@@ -103,11 +103,6 @@ def doubled(scene: Scene) -> Scene:
     )
 
 
-@pytest.fixture(params=["float16", "float32"])
-def precision(request):
-    return request.param
-
-
 @pytest.fixture
 def quick(gl, precision):
     """Moves as a processor does, wherever this runs."""

@@ -1,8 +1,15 @@
-"""Every test of the window has folders of its own: no test reads or writes a person's."""
+"""Every test of the window has folders of its own: no test reads or writes a person's; and a room to show."""
 
 from pathlib import Path
 
 import pytest
+import torch
+
+from app.window.scene.commands import SceneArrived
+from app.window.scene.state import SceneInfo
+from app.window.scene.work import describe_scene
+from app.window.state import State
+from tests.app.window.scenes import after, room
 
 
 @pytest.fixture(autouse=True, scope="session")
@@ -19,3 +26,14 @@ def folders(monkeypatch, tmp_path: Path) -> Path:
     monkeypatch.setenv("LANGFLASH_CONFIG", str(tmp_path / "config"))
     monkeypatch.setenv("LANGFLASH_STATE", str(tmp_path / "state"))
     return tmp_path
+
+
+@pytest.fixture(scope="session")
+def info() -> SceneInfo:
+    """The small room; nothing changes it."""
+    return describe_scene(room(torch.eye(3)), serial=1, name="room")
+
+
+@pytest.fixture
+def shown(info: SceneInfo) -> State:
+    return after(State(), SceneArrived(info))

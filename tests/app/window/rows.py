@@ -11,7 +11,7 @@ from imgui_bundle import imgui
 
 from app.window.kit.boxes import Box, overlap
 
-LABELLED = ("button", "selectable", "checkbox")  # words that have to fit into the item itself
+LABELLED = ("button", "small_button", "selectable", "checkbox")  # words that have to fit into the item itself
 _FIELDS = ("input_text", "input_text_with_hint", "slider_float", "progress_bar")
 _WORDS = ("text", "text_colored", "text_wrapped", "text_unformatted", "text_disabled")
 SLACK = 1.0  # pixels: ImGui puts items on whole ones

@@ -4,7 +4,6 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-import torch
 
 from app.window import commands as do
 from app.window.asking import commands as ask
@@ -13,20 +12,9 @@ from app.window.frame.status import figures, fitting
 from app.window.kit.widgets import sentence
 from app.window.scene import camera
 from app.window.scene import commands as show
-from app.window.scene.work import describe_scene
 from app.window.state import TOAST_SECONDS, State
 from langflash_core.base import pictures
-from tests.app.window.scenes import after, room, shown_scene
-
-
-@pytest.fixture(scope="module")
-def info():
-    return describe_scene(room(torch.eye(3)), serial=1, name="room")
-
-
-@pytest.fixture
-def shown(info) -> State:
-    return after(State(), show.SceneArrived(info))
+from tests.app.window.scenes import after, shown_scene
 
 
 def test_a_command_leaves_the_old_state_alone() -> None:

@@ -24,7 +24,7 @@ from app.window.touring import commands as tour
 from app.window.touring import panel as tour_panel
 from langflash_core.geometry.poses import Pose, Vector, orbit, tour_seconds
 from langflash_core.mending.recipes import Recipe
-from langflash_core.scene.tour import LONGEST_NAME, LONGEST_TEXT
+from langflash_core.scene.settings import TOURS
 from tests.app.window.headless import box, context, frames, look
 from tests.app.window.items import Items
 from tests.app.window.scenes import VIEWS, after, shown_scene
@@ -129,13 +129,13 @@ def test_a_name_that_is_cut_is_read_in_whole_on_hover(items: Items, name: str) -
 
 def test_of_too_long_a_name_what_there_is_room_for_is_kept() -> None:
     """All that was typed went away, with a sentence that it was too long."""
-    for most, change in ((LONGEST_NAME, "name"), (LONGEST_TEXT, "text")):
+    for most, change in ((TOURS.longest_name, "name"), (TOURS.longest_text, "text")):
         typed, told = tour_panel._cut("  " + "plant " * 100, most, "A stop's name")
         named = tour.ChangeStop(0, name=typed) if change == "name" else tour.ChangeStop(0, text=typed)
         state = after(shown_scene(), tour.AddStop(), named, *told)
         assert getattr(state.tour.stops[0], change).strip() == ("plant " * 100)[:most].strip()
         assert f"at most {most} letters" in state.toasts[-1].text
-    assert tour_panel._cut(" short ", LONGEST_NAME, "") == ("short", [])
+    assert tour_panel._cut(" short ", TOURS.longest_name, "") == ("short", [])
 
 
 def test_the_present_edit_is_seen_where_the_list_stands_low() -> None:

@@ -2,6 +2,7 @@
 
 from dataclasses import replace
 from datetime import datetime
+from itertools import pairwise
 from pathlib import Path
 
 import pytest
@@ -12,7 +13,7 @@ from app.window.dialogs import Dialog
 from app.window.editing import commands as edit
 from app.window.editing.panels import tools
 from app.window.editing.panels.tools import _GAP, _MARGIN, _TOOLS, tool_side
-from app.window.editing.state import Floaters, Hiding, Tint, Tool
+from app.window.editing.state import Floaters, Hiding, Reached, Tint, Tool
 from app.window.filming import commands as film
 from app.window.frame import dialogs, layout
 from app.window.inventory import commands as take
@@ -26,8 +27,10 @@ from app.window.state import State
 from app.window.touring import commands as tour
 from langflash_core.scene.edited import first_marks
 from langflash_core.scene.edits import History
+from langflash_core.scene.mask import Mask
 from tests.app.window.headless import box, context, frames, look
 from tests.app.window.items import Items
+from tests.app.window.rows import Rows
 from tests.app.window.scenes import after, shown_scene
 from tests.app.window.test_stumbles import Hands, items
 
@@ -81,6 +84,57 @@ def test_bars_end_where_the_window_ends(state: State, scale: float) -> None:
     for _left, _top, right, _bottom in boxes:
         assert right <= 800 * scale - tools._MARGIN * scale + 1
     assert boxes[0][3] <= boxes[1][1]
+
+
+@pytest.mark.parametrize(
+    ("changes", "name"),
+    [
+        ({"tool": Tool.BRUSH}, "Radius"),
+        ({"tool": Tool.PICK}, "Size"),
+        ({"tint": Tint((0.8, 0.2, 0.2), 0.8)}, "Strength"),
+        ({"floaters": Floaters(bytes(4 * 12_300))}, "Strength"),
+        ({"hiding": Hiding("blur")}, "Margin"),
+    ],
+    ids=["brush", "levels", "tint", "floaters", "hiding"],
+)
+def test_a_slider_over_the_picture_says_what_it_is(monkeypatch, changes: dict, name: str) -> None:
+    """Its name stood in the tip alone, so there were two bare knobs in a row."""
+    rows, state = Rows(monkeypatch), edited(**changes)
+    history = state.editing.history
+    assert history is not None
+    if state.editing.tool is Tool.PICK:
+        masks = Mask.first(4, 1), Mask.first(4, 2)
+        state = state.with_editing(clicked=Reached(masks, 0, "replace", history, history))
+    with context((800, 500)):
+        theme.set_up(1.0, "dark")
+        frames(lambda seen: tools.draw(state, seen, ImVec2(348, 52), ImVec2(452, 416)), look())
+    shown = [row for row in rows.now() if row.window.startswith("##bar")]
+    named = [(last, row) for last, row in pairwise(shown) if row.kind == "slider_float"]
+    assert name in [last.words for last, _ in named]
+    for last, row in named:
+        assert (
+            last.kind == "text_colored"
+            and last.box[2] <= row.box[0]
+            and last.box[1] < row.box[3]
+            and row.box[1] < last.box[3]
+        )
+
+
+def test_warnings_leave_room_for_the_answer(monkeypatch) -> None:
+    """At 900 x 560 some warnings of photos pushed "found" and "not found" out of the panel."""
+    rows, state = Rows(monkeypatch), shown_scene()
+    told = "does not meet the photos beside it; take more photos there, with more light, and hold still"
+    said = tuple(f"photo {number} {told}" for number in range(1, 5))
+    assert state.scene.info is not None
+    state = state.with_scene(info=replace(state.scene.info, warnings=said))
+    asked = state.with_asking(prompts=(replace(state.asking.prompts[0], score=0.1),))
+    with context((900, 560)):
+        theme.set_up(1.0, "dark")
+        frames(lambda seen: layout.draw_all(asked, seen), look())
+    answer = next(row for row in rows.now() if "not found" in row.words)
+    assert answer.box[3] <= answer.inside[3]
+    warned = [row.words for row in rows.now() if row.words.startswith("Photo ")]
+    assert len(warned) == 4 and all(words.endswith("...") for words in warned)
 
 
 def test_small_tools_show_their_whole_icons(monkeypatch) -> None:

@@ -1,6 +1,7 @@
 """Where OpenGL runs on the processor a picture comes to rest, whatever size it moves at."""
 
 import time
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -30,10 +31,11 @@ from langflash_core.scene.edits import History, delete
 from langflash_core.scene.exposure import lit_camera
 from langflash_core.scene.mask import Mask
 from langflash_core.scene.thin import thin_with_rows
+from langflash_core.types import Scene
 from tests.app.gl.test_gl_layers import layered
-from tests.app.window.scenes import PHRASES, after, room, shown_scene
+from tests.app.window.scenes import PHRASES, VIEWS, after, room, shown_scene
 
-SIZE = (160, 120)
+SIZE, START = (160, 120), VIEWS[0]
 
 
 class Quick(Governor):
@@ -50,145 +52,139 @@ class Stubborn(Governor):
         return Plan(wanted, 0.75)
 
 
-def test_a_picture_comes_to_rest_in_full(context) -> None:
+@pytest.fixture
+def viewport(context) -> Iterator[Viewport]:
+    with context:
+        made = Viewport(context)
+        yield made
+        made.release()
+
+
+def spoken_room() -> Scene:
+    return room(language_space("minilm").encode(list(PHRASES)))
+
+
+def showing(scene: Scene, serial: int = 1, **changes) -> State:
+    """A state with this scene and the phrase "door"."""
+    info = shown_scene().scene.info
+    assert info is not None
+    return shown_scene().with_scene(info=replace(info, serial=serial, scene=scene), **changes)
+
+
+def on_the_processor(viewport: Viewport) -> ProcessorPicture:
+    """Its picture; the test ends here where OpenGL draws all pictures itself."""
+    if not isinstance(viewport.picture, ProcessorPicture):
+        pytest.skip("OpenGL here has a graphics card, which draws all pictures itself")
+    return viewport.picture
+
+
+def test_a_picture_comes_to_rest_in_full(viewport) -> None:
     """A half-size picture that does not cover what moves would be drawn over, and ordered again, for ever."""
     space = language_space("minilm")
-    shown = shown_scene()
-    assert shown.scene.info is not None
-    scene = room(space.encode(list(PHRASES)))
-    state = shown.with_scene(mode=pictures.HEAT, info=replace(shown.scene.info, scene=scene))
-    with context:
-        viewport = Viewport(context)
-        viewport.set_scene(1, scene)
-        picture = viewport.picture
-        if not isinstance(picture, ProcessorPicture):
-            pytest.skip("OpenGL here has a graphics card, which draws all pictures itself")
-        viewport.ask((0,), compile_query(scene, space, list(PHRASES[:1])))
-        plans: list[Plan] = []
-        for _ in range(300):
-            picture.governor = Stubborn(slow=True)
-            state = replace(state, now=state.now + 0.05)
-            viewport.update(state, SIZE, touched=0.0)
-            plan = getattr(viewport.drawn, "plan", None)
-            if plan is not None and (not plans or plans[-1] != plan):
-                plans.append(plan)
-            if plan == Plan(Kind.MAPS) and not viewport.settling:
-                break
-            time.sleep(0.01)
-        viewport.release()
+    scene = spoken_room()
+    state = showing(scene, mode=pictures.HEAT)
+    viewport.set_scene(1, scene)
+    picture = on_the_processor(viewport)
+    viewport.ask((0,), compile_query(scene, space, list(PHRASES[:1])))
+    plans: list[Plan] = []
+    for _ in range(300):
+        picture.governor = Stubborn(slow=True)
+        state = replace(state, now=state.now + 0.05)
+        viewport.update(state, SIZE, touched=0.0)
+        plan = getattr(viewport.drawn, "plan", None)
+        if plan is not None and (not plans or plans[-1] != plan):
+            plans.append(plan)
+        if plan == Plan(Kind.MAPS) and not viewport.settling:
+            break
+        time.sleep(0.01)
     assert plans[-1] == Plan(Kind.MAPS)
     assert len(plans) <= 3, "the moving one, and what follows it at rest"
 
 
-def test_what_moves_in_full_size_is_followed_by_the_exact_picture(context) -> None:
+def test_what_moves_in_full_size_is_followed_by_the_exact_picture(viewport) -> None:
     """In a small room it has all pixels, and still ends footprints early: at rest it is not the last one."""
-    shown = shown_scene()
-    scene = room(language_space("minilm").encode(list(PHRASES)))
-    assert shown.scene.info is not None
-    state = shown.with_asking(prompts=()).with_scene(info=replace(shown.scene.info, scene=scene))
-    with context:
-        viewport = Viewport(context)
-        viewport.set_scene(1, scene)
-        picture = viewport.picture
-        if not isinstance(picture, ProcessorPicture):
-            pytest.skip("OpenGL here has a graphics card, which draws all pictures itself")
-        plans = []
-        for _ in range(300):
-            picture.governor = Quick(slow=True)
-            state = replace(state, now=state.now + 0.05)
-            viewport.update(state, SIZE, touched=0.0)
-            plans.append(getattr(viewport.drawn, "plan", None))
-            if viewport.whole:
-                break
-            time.sleep(0.01)
-        still = picture.stills.shown
-        viewport.release()
+    scene = spoken_room()
+    state = showing(scene).with_asking(prompts=())
+    viewport.set_scene(1, scene)
+    picture = on_the_processor(viewport)
+    plans = []
+    for _ in range(300):
+        picture.governor = Quick(slow=True)
+        state = replace(state, now=state.now + 0.05)
+        viewport.update(state, SIZE, touched=0.0)
+        plans.append(getattr(viewport.drawn, "plan", None))
+        if viewport.whole:
+            break
+        time.sleep(0.01)
+    still = picture.stills.shown
     assert Plan(Kind.COLOUR) in plans[:-1], "the moving one came first"
     assert still is not None and (still.camera.width, still.camera.height) == SIZE
 
 
-def test_pictures_that_move_and_that_rest_are_in_the_light_of_their_place(context) -> None:
-    plain, shown = room(torch.eye(3, 384)), shown_scene()
-    assert shown.scene.info is not None
+def test_pictures_that_move_and_that_rest_are_in_the_light_of_their_place(viewport) -> None:
+    plain = room(torch.eye(3, 384))
     rows = [[1.4, 1.2, 0.8]] * plain.num_views
     scene = plain.with_record(light={"gains": rows, "offsets": [[0.1, 0.0, -0.1]] * plain.num_views})
-    state = shown.with_scene(info=replace(shown.scene.info, scene=scene))
+    state = showing(scene)
     drawn = set()
-    with context:
-        viewport = Viewport(context)
-        viewport.set_scene(1, scene)
-        for turn in range(300):
-            pose = orbit(shown.scene.pose, 0.02 * min(turn, 5), 0.0)
-            state = replace(state.with_scene(pose=pose), now=state.now + 0.05)
-            viewport.update(state, SIZE, touched=state.now if turn < 5 else 0.0)
-            easel = None if viewport.picture is None else viewport.picture.easel
-            if easel is not None and easel.camera is not None and viewport.drawn is not None:
-                expected = lit_camera(scene, replace(easel.camera, light=None)).light
-                assert easel.camera.light is not None and expected is not None
-                assert torch.equal(easel.camera.light, expected)
-                drawn.add(getattr(viewport.drawn, "plan", None))
-            if turn > 5 and viewport.whole and not viewport.settling:
-                break
-            time.sleep(0.01)
-        viewport.release()
-    assert Plan(Kind.COLOUR) in drawn, "the one at rest"
+    viewport.set_scene(1, scene)
+    for turn in range(300):
+        pose = orbit(START, 0.02 * min(turn, 5), 0.0)
+        state = replace(state.with_scene(pose=pose), now=state.now + 0.05)
+        viewport.update(state, SIZE, touched=state.now if turn < 5 else 0.0)
+        easel = None if viewport.picture is None else viewport.picture.easel
+        if easel is not None and easel.camera is not None and viewport.drawn is not None:
+            expected = lit_camera(scene, replace(easel.camera, light=None)).light
+            assert easel.camera.light is not None and expected is not None
+            assert torch.equal(easel.camera.light, expected)
+            drawn.add(getattr(viewport.drawn, "plan", None))
+        if turn > 5 and viewport.whole and not viewport.settling:
+            break
+        time.sleep(0.01)
+    assert drawn & {Plan(Kind.COLOUR), Plan(Kind.MAPS)}, "the one at rest, whichever the machine has time for"
 
 
-def test_a_scene_begins_without_the_targets_of_the_one_before(context) -> None:
+def test_a_scene_begins_without_the_targets_of_the_one_before(viewport) -> None:
     """What its modes took: 30 MB at 652 x 616 after a look at a heat-map, weight maps more."""
-    space = language_space("minilm")
-    shown = shown_scene()
-    assert shown.scene.info is not None
-    scene, other = (room(space.encode(list(PHRASES))) for _ in range(2))
-    state = shown.with_scene(mode=pictures.HEAT, info=replace(shown.scene.info, scene=scene))
-    with context:
-        viewport = Viewport(context)
-        viewport.set_scene(1, scene)
-        viewport.ask((0,), compile_query(scene, space, list(PHRASES[:1])))
-        for _ in range(3):
-            state = replace(state, now=state.now + 0.05)
-            viewport.update(state, SIZE, touched=0.0)
-        view = viewport._made().canvas.view(viewport.picture_size)
-        viewport.set_scene(2, other)
-        held = viewport._made().canvas.holds(view)
-        for _ in range(3):
-            state = replace(
-                state.with_scene(info=replace(shown.scene.info, serial=2, scene=other)), now=state.now + 0.05
-            )
-            viewport.update(state, SIZE, touched=0.0)
-        drawn = viewport.texture
-        viewport.release()
+    scene, other = spoken_room(), spoken_room()
+    state = showing(scene, mode=pictures.HEAT)
+    viewport.set_scene(1, scene)
+    viewport.ask((0,), compile_query(scene, language_space("minilm"), list(PHRASES[:1])))
+    for _ in range(3):
+        state = replace(state, now=state.now + 0.05)
+        viewport.update(state, SIZE, touched=0.0)
+    view = viewport._made().canvas.view(viewport.picture_size)
+    viewport.set_scene(2, other)
+    held = viewport._made().canvas.holds(view)
+    for _ in range(3):
+        state = replace(showing(other, 2, mode=pictures.HEAT), now=state.now + 0.05)
+        viewport.update(state, SIZE, touched=0.0)
+    drawn = viewport.texture
     assert not held and drawn is not None
 
 
-def test_a_changed_scene_shows_its_last_picture_until_the_next(context) -> None:
+def test_a_changed_scene_shows_its_last_picture_until_the_next(viewport) -> None:
     """The empty window's "Drop photos of a room here" came in between, at every part taken out or copied."""
-    space = language_space("minilm")
-    shown = shown_scene()
-    assert shown.scene.info is not None
-    scene, other = (room(space.encode(list(PHRASES))) for _ in range(2))
-    state = shown.with_asking(prompts=()).with_scene(info=replace(shown.scene.info, scene=scene))
-    with context:
-        viewport = Viewport(context)
-        viewport.set_scene(1, scene)
-        while viewport.texture is None:
-            state = replace(state, now=state.now + 0.05)
-            viewport.update(state, SIZE, touched=0.0)
-        before = viewport.texture.read()
-        viewport.set_scene(2, other, changed=True)
-        kept = viewport.texture
-        assert kept is not None and kept.read() == before
-        assert viewport.seen() is None, "what was hidden for good may be in it"
-        while viewport.seen() is None:
-            state = replace(state, now=state.now + 0.05)
-            viewport.update(state, SIZE, touched=0.0)
-        assert viewport.texture is not kept and not hasattr(kept.mglo, "use")
-        viewport.set_scene(3, scene)
-        assert viewport.texture is None, "another scene's would mislead"
-        viewport.release()
+    scene, other = spoken_room(), spoken_room()
+    state = showing(scene).with_asking(prompts=())
+    viewport.set_scene(1, scene)
+    while viewport.texture is None:
+        state = replace(state, now=state.now + 0.05)
+        viewport.update(state, SIZE, touched=0.0)
+    before = viewport.texture.read()
+    viewport.set_scene(2, other, changed=True)
+    kept = viewport.texture
+    assert kept is not None and kept.read() == before
+    assert viewport.seen() is None, "what was hidden for good may be in it"
+    while viewport.seen() is None:
+        state = replace(state, now=state.now + 0.05)
+        viewport.update(state, SIZE, touched=0.0)
+    assert viewport.texture is not kept and not hasattr(kept.mglo, "use")
+    viewport.set_scene(3, scene)
+    assert viewport.texture is None, "another scene's would mislead"
 
 
-def test_a_picture_that_could_not_be_drawn_is_told_and_tried_again(context, monkeypatch) -> None:
+def test_a_picture_that_could_not_be_drawn_is_told_and_tried_again(viewport, monkeypatch) -> None:
     broken, tried = [True], []
     real = still.draw_still
 
@@ -199,139 +195,115 @@ def test_a_picture_that_could_not_be_drawn_is_told_and_tried_again(context, monk
         return real(*args, **named)
 
     monkeypatch.setattr("app.window.drawing.stills.draw_still", draw_still)
-    scene = room(language_space("minilm").encode(list(PHRASES)))
-    shown = shown_scene()
-    assert shown.scene.info is not None
-    state = shown.with_scene(info=replace(shown.scene.info, scene=scene))
-    with context:
-        viewport = Viewport(context)
-        viewport.set_scene(1, scene)
-        picture = viewport.picture
-        if not isinstance(picture, ProcessorPicture):
-            pytest.skip("OpenGL here has a graphics card, which draws all pictures itself")
+    scene = spoken_room()
+    state = showing(scene)
+    viewport.set_scene(1, scene)
+    picture = on_the_processor(viewport)
 
-        def live(seconds: float, until) -> None:
-            nonlocal state
-            for _ in range(300):
-                if until():
-                    return
-                picture.governor = Stubborn(slow=True)
-                state = replace(state, now=state.now + seconds)
-                viewport.update(state, SIZE, touched=0.0)
-                time.sleep(0.01)
-            raise AssertionError("nothing came of it")
+    def live(seconds: float, until) -> None:
+        nonlocal state
+        for _ in range(300):
+            if until():
+                return
+            picture.governor = Stubborn(slow=True)
+            state = replace(state, now=state.now + seconds)
+            viewport.update(state, SIZE, touched=0.0)
+            time.sleep(0.01)
+        raise AssertionError("nothing came of it")
 
-        live(0.05, lambda: viewport.failing)
-        assert len(tried) == 1
-        wait = viewport.update(state, SIZE, touched=0.0)
-        assert 0 < wait <= RETRY_SECONDS and not viewport.settling, "not at once, and not never"
-        broken[0] = False
-        live(RETRY_SECONDS, lambda: getattr(viewport.drawn, "plan", Plan(Kind.FAST, 0.5)).scale == 1.0)
-        assert not viewport.failing
-        viewport.release()
+    live(0.05, lambda: viewport.failing)
+    assert len(tried) == 1
+    wait = viewport.update(state, SIZE, touched=0.0)
+    assert 0 < wait <= RETRY_SECONDS and not viewport.settling, "not at once, and not never"
+    broken[0] = False
+    live(RETRY_SECONDS, lambda: getattr(viewport.drawn, "plan", Plan(Kind.FAST, 0.5)).scale == 1.0)
+    assert not viewport.failing
 
 
-def test_only_the_picture_on_show_is_scored(context) -> None:
+def test_only_the_picture_on_show_is_scored(viewport) -> None:
     """A score and the picture beside it are of the same place, the same marks and the same question."""
     space = language_space("minilm")
-    shown = shown_scene()
-    assert shown.scene.info is not None
-    scene = room(space.encode(list(PHRASES)))
-    state = shown.with_scene(mode=pictures.HEAT, info=replace(shown.scene.info, scene=scene))
+    scene = spoken_room()
+    state = showing(scene, mode=pictures.HEAT)
     query = compile_query(scene, space, list(PHRASES[:1]))
-    with context:
-        viewport = Viewport(context)
-        viewport.set_scene(1, scene)
-        viewport.ask((0,), query, state.asking.revision)
-        view = None
-        for _ in range(600):
-            state = replace(state, now=state.now + 0.05)
-            viewport.update(state, SIZE, touched=0.0)
-            view = viewport.view(state)
-            if view is not None:
-                break
-            time.sleep(0.01)
-        assert view is not None and viewport.view(state) is None, "once"
-        viewport.ask((0,), query, state.asking.revision)
-        assert viewport.view(state.with_scene(pose=orbit(state.scene.pose, 0.2, 0.0))) is None, (
-            "of another place"
-        )
-        lapsed = state.with_asking(revision=state.asking.revision + 1)
-        assert viewport.view(lapsed) is None, "of a question that holds no more"
-        assert viewport.view(state) is not None
-        viewport.release()
+    viewport.set_scene(1, scene)
+    viewport.ask((0,), query, state.asking.revision)
+    view = None
+    for _ in range(600):
+        state = replace(state, now=state.now + 0.05)
+        viewport.update(state, SIZE, touched=0.0)
+        view = viewport.view(state)
+        if view is not None:
+            break
+        time.sleep(0.01)
+    assert view is not None and viewport.view(state) is None, "once"
+    viewport.ask((0,), query, state.asking.revision)
+    assert viewport.view(state.with_scene(pose=orbit(state.scene.pose, 0.2, 0.0))) is None, "of another place"
+    lapsed = state.with_asking(revision=state.asking.revision + 1)
+    assert viewport.view(lapsed) is None, "of a question that holds no more"
+    assert viewport.view(state) is not None
 
 
-def test_gaps_are_filled_as_the_preference_says(context) -> None:
+def test_gaps_are_filled_as_the_preference_says(viewport) -> None:
     """The picture follows it at once, without another drawing."""
-    shown = shown_scene()
-    assert shown.scene.info is not None
-    plain = room(language_space("minilm").encode(list(PHRASES)))
+    plain = spoken_room()
     scene = replace(plain, view_ids=torch.zeros(len(plain.gaussians), dtype=torch.int64))
-    aside = orbit(shown.scene.pose, 1.0, 0.0)  # beside the wall nothing is drawn
-    state = shown.with_scene(info=replace(shown.scene.info, scene=scene), pose=aside)
-    with context:
-        viewport = Viewport(context)
-        viewport.set_scene(1, scene)
-        drawn, pictures = object(), []
-        while viewport.drawn is not drawn:  # the governor finds its size
-            drawn = viewport.drawn
-            for _ in range(4):
-                viewport.update(state, SIZE, touched=0.0)
-        for fill in (True, False, True):
-            state = replace(state, preferences=replace(state.preferences, fill_gaps=fill, near_photos=False))
+    aside = orbit(START, 1.0, 0.0)  # beside the wall nothing is drawn
+    state = showing(scene, pose=aside)
+    viewport.set_scene(1, scene)
+    drawn, pictures = object(), []
+    while viewport.drawn is not drawn:  # the governor finds its size
+        drawn = viewport.drawn
+        for _ in range(4):
             viewport.update(state, SIZE, touched=0.0)
-            assert viewport.texture is not None and viewport.drawn is drawn
-            pictures.append(np.frombuffer(viewport.texture.read(), np.uint8))
-        viewport.release()
+    for fill in (True, False, True):
+        state = replace(state, preferences=replace(state.preferences, fill_gaps=fill, near_photos=False))
+        viewport.update(state, SIZE, touched=0.0)
+        assert viewport.texture is not None and viewport.drawn is drawn
+        pictures.append(np.frombuffer(viewport.texture.read(), np.uint8))
     assert np.array_equal(pictures[0], pictures[2]) and (pictures[0] != pictures[1]).any()
 
 
-def test_a_scene_with_levels_moves_coarse_and_rests_whole(context, monkeypatch) -> None:
+def test_a_scene_with_levels_moves_coarse_and_rests_whole(viewport, monkeypatch) -> None:
     """Where OpenGL runs on the processor, until some detail is chosen."""
     monkeypatch.setattr("app.window.governor.MIDDLING_SCENE", 10_000)
-    scene = room(language_space("minilm").encode(list(PHRASES)))
+    scene = spoken_room()
     levels = (torch.arange(len(scene.gaussians)) % 4 > 0).to(torch.uint8)
     scene = replace(scene, levels=levels)
-    shown = shown_scene()
-    assert shown.scene.info is not None
-    state = shown.with_asking(prompts=()).with_scene(info=replace(shown.scene.info, scene=scene))
-    with context:
-        viewport = Viewport(context)
-        viewport.set_scene(1, scene)
-        picture = viewport.picture
-        assert picture is not None
-        if not isinstance(picture, ProcessorPicture):
-            assert picture.governor.share == 1
-            pytest.skip("OpenGL here has a graphics card, which draws all pictures itself")
-        plans = []
-        for turn in range(40):
-            pose = orbit(shown.scene.pose, 0.02 * min(turn, 20), 0.0)
-            state = replace(state.with_scene(pose=pose), now=state.now + 0.05)
-            viewport.update(state, SIZE, touched=state.now)
-            plans.append(getattr(viewport.drawn, "plan", None))
-            if turn == 20:
-                marks = first_marks(scene)
-                viewport.mark(SceneMemory(scene), delete(marks, Mask.first(marks.selected.count, 90)), None)
-        moved = {plan.share for plan in plans if plan is not None}
-        live = viewport._made()._scene
-        assert live is not None and {*live._levels} == {0.25}
-        for share in viewport.shares:
-            viewport.thin(scene, share, *thin_with_rows(scene, share))
-        assert picture.governor.ladder[2:4] == ((0.75, 0.625), (0.5, 0.625))
-        for _ in range(300):
-            state = replace(state, now=state.now + 0.05)
-            viewport.update(state, SIZE, touched=0.0)
-            if viewport.drawn is not None and getattr(viewport.drawn, "plan", None) == Plan(Kind.COLOUR):
-                break
-            time.sleep(0.01)
-        rested = getattr(viewport.drawn, "plan", None)
-        viewport.release()
+    state = showing(scene).with_asking(prompts=())
+    viewport.set_scene(1, scene)
+    picture = viewport.picture
+    assert picture is not None
+    if not isinstance(picture, ProcessorPicture):
+        assert picture.governor.share == 1
+        pytest.skip("OpenGL here has a graphics card, which draws all pictures itself")
+    plans = []
+    for turn in range(40):
+        pose = orbit(START, 0.02 * min(turn, 20), 0.0)
+        state = replace(state.with_scene(pose=pose), now=state.now + 0.05)
+        viewport.update(state, SIZE, touched=state.now)
+        plans.append(getattr(viewport.drawn, "plan", None))
+        if turn == 20:
+            marks = first_marks(scene)
+            viewport.mark(SceneMemory(scene), delete(marks, Mask.first(marks.selected.count, 90)), None)
+    moved = {plan.share for plan in plans if plan is not None}
+    live = viewport._made()._scene
+    assert live is not None and {*live._levels} == {0.25}
+    for share in viewport.shares:
+        viewport.thin(scene, share, *thin_with_rows(scene, share))
+    assert picture.governor.ladder[2:4] == ((0.75, 0.625), (0.5, 0.625))
+    for _ in range(300):
+        state = replace(state, now=state.now + 0.05)
+        viewport.update(state, SIZE, touched=0.0)
+        if viewport.drawn is not None and getattr(viewport.drawn, "plan", None) == Plan(Kind.COLOUR):
+            break
+        time.sleep(0.01)
+    rested = getattr(viewport.drawn, "plan", None)
     assert 0.25 in moved and moved <= {0.25, 1.0}
     assert rested == Plan(Kind.COLOUR), "all of them"
 
 
-def test_a_scene_of_layers_is_made_ready_a_layer_a_frame(context, monkeypatch) -> None:
+def test_a_scene_of_layers_is_made_ready_a_layer_a_frame(viewport, monkeypatch) -> None:
     """Buffers of one layer, or one shader, in each frame, also where the camera leaps to another photo; then
     the picture that rests."""
     scene, made = layered(12, count=60), []
@@ -343,129 +315,114 @@ def test_a_scene_of_layers_is_made_ready_a_layer_a_frame(context, monkeypatch) -
         return real(level, view)
 
     monkeypatch.setattr(LayeredLevel, "_made", counted)
-    shown = shown_scene()
-    assert shown.scene.info is not None
-    info = replace(shown.scene.info, scene=scene, history=History(first_marks(scene)))
-    state = after(State(), SceneArrived(info))
-    with context:
-        viewport = Viewport(context)
-        viewport.set_scene(1, scene)
-        programs = viewport._made().canvas.painter.programs._made
-        compiled = set()
-        for view in (2, 9):
-            own = scene.camera(view)
-            seen = own.viewmat.double().numpy(), own.K.double().numpy(), (own.width, own.height)
-            state = state.with_scene(pose=from_view(*seen, 1.0))
-            before = len(made)
-            for _ in range(300):
-                counts = len(made), len(programs)
-                state = replace(state, now=state.now + 0.05)
-                viewport.update(state, SIZE, touched=0.0)
-                assert len(made) <= counts[0] + 1
-                if len(programs) > counts[1] and viewport.drawn is None:
-                    compiled |= set(programs)
-                    assert len(programs) == counts[1] + 1
-                if viewport.whole and not viewport.settling:
-                    break
-                time.sleep(0.01)
-            assert viewport.whole and len(made) > before
-        assert "blend.frag" in str(compiled)
-        viewport.release()
+    info = showing(scene).scene.info
+    assert info is not None
+    state = after(State(), SceneArrived(replace(info, history=History(first_marks(scene)))))
+    viewport.set_scene(1, scene)
+    programs = viewport._made().canvas.painter.programs._made
+    compiled = set()
+    for view in (2, 9):
+        own = scene.camera(view)
+        seen = own.viewmat.double().numpy(), own.K.double().numpy(), (own.width, own.height)
+        state = state.with_scene(pose=from_view(*seen, 1.0))
+        before = len(made)
+        for _ in range(300):
+            counts = len(made), len(programs)
+            state = replace(state, now=state.now + 0.05)
+            viewport.update(state, SIZE, touched=0.0)
+            assert len(made) <= counts[0] + 1
+            if len(programs) > counts[1] and viewport.drawn is None:
+                compiled |= set(programs)
+                assert len(programs) == counts[1] + 1
+            if viewport.whole and not viewport.settling:
+                break
+            time.sleep(0.01)
+        assert viewport.whole and len(made) > before
+    assert "blend.frag" in str(compiled)
 
 
-def test_of_a_huge_scene_only_a_share_is_brought_to_opengl_on_the_processor(context, monkeypatch) -> None:
+def test_of_a_huge_scene_only_a_share_is_brought_to_opengl_on_the_processor(viewport, monkeypatch) -> None:
     """All of ten million stopped the window for half a minute; at rest threads draw them all."""
     monkeypatch.setattr("app.window.governor.HUGE_SCENE", 10_000)
     monkeypatch.setattr("app.window.governor.LARGE_SCENE", 2_000)
     space = language_space("minilm")
-    scene = room(space.encode(list(PHRASES)))
+    scene = spoken_room()
     share = 2_000 / len(scene.gaussians)
-    shown = shown_scene()
-    assert shown.scene.info is not None
-    state = shown.with_scene(info=replace(shown.scene.info, scene=scene))
-    with context:
-        viewport = Viewport(context)
-        viewport.set_scene(1, scene)
-        if isinstance(viewport.picture, CardPicture):
-            viewport.release()
-            pytest.skip("OpenGL here has a graphics card")
-        assert viewport.picture is None and viewport.shares == (share,) and not viewport.whole
-        viewport.ask((0,), compile_query(scene, space, list(PHRASES[:1])))
-        viewport.update(state, SIZE, touched=0.0)
-        other = room(torch.eye(3, 384))
-        viewport.thin(other, share, *thin_with_rows(other, share))  # of a scene that was there before
-        assert viewport.picture is None and viewport.drawn is None
-        viewport.thin(scene, share, *thin_with_rows(scene, share))
-        picture = viewport.picture
-        assert picture is not None and picture.easel.asked.keys == (0,) and viewport.shares == ()
-        plans = []
-        for turn in range(300):
-            pose = orbit(shown.scene.pose, 0.02 * min(turn, 20), 0.0)
-            state = replace(state.with_scene(pose=pose), now=state.now + 0.05)
-            viewport.update(state, SIZE, touched=state.now if turn < 20 else 0.0)
-            plans.append(getattr(viewport.drawn, "plan", None))
-            if turn > 20 and viewport.whole and not viewport.settling:
-                break
-            time.sleep(0.01)
-        live = viewport._made()._scene
-        assert live is not None and {*live._levels} == {share}
-        viewport.release()
+    state = showing(scene)
+    viewport.set_scene(1, scene)
+    if isinstance(viewport.picture, CardPicture):
+        pytest.skip("OpenGL here has a graphics card")
+    assert viewport.picture is None and viewport.shares == (share,) and not viewport.whole
+    viewport.ask((0,), compile_query(scene, space, list(PHRASES[:1])))
+    viewport.update(state, SIZE, touched=0.0)
+    other = room(torch.eye(3, 384))
+    viewport.thin(other, share, *thin_with_rows(other, share))  # of a scene that was there before
+    assert viewport.picture is None and viewport.drawn is None
+    viewport.thin(scene, share, *thin_with_rows(scene, share))
+    picture = viewport.picture
+    assert picture is not None and picture.easel.asked.keys == (0,) and viewport.shares == ()
+    plans = []
+    for turn in range(300):
+        pose = orbit(START, 0.02 * min(turn, 20), 0.0)
+        state = replace(state.with_scene(pose=pose), now=state.now + 0.05)
+        viewport.update(state, SIZE, touched=state.now if turn < 20 else 0.0)
+        plans.append(getattr(viewport.drawn, "plan", None))
+        if turn > 20 and viewport.whole and not viewport.settling:
+            break
+        time.sleep(0.01)
+    live = viewport._made()._scene
+    assert live is not None and {*live._levels} == {share}
     moved = {plan.share for plan in plans[:20] if plan is not None}
     assert moved == {share} and plans[-1] is not None and plans[-1].share == 1
 
 
 @pytest.mark.parametrize("picture", [ProcessorPicture, CardPicture])
-def test_what_a_phrase_does_not_mean_leaves_the_picture_and_no_splat_is_drawn(context, picture) -> None:
+def test_what_a_phrase_does_not_mean_leaves_the_picture_and_no_splat_is_drawn(viewport, picture) -> None:
     """The armchair is red and stands before the wall: by its colour and its place it is told from others."""
     space = language_space("minilm")
-    shown = shown_scene()
-    assert shown.scene.info is not None
-    scene = room(space.encode(list(PHRASES)))
-    state = shown.with_scene(mode=pictures.HEAT, info=replace(shown.scene.info, scene=scene))
-    with context:
-        viewport = Viewport(context)
-        viewport.set_scene(1, scene)
-        if picture is CardPicture:
-            viewport.picture = CardPicture(viewport._made(), 1, scene)
+    scene = spoken_room()
+    state = showing(scene, mode=pictures.HEAT)
+    viewport.set_scene(1, scene)
+    if picture is CardPicture:
+        viewport.picture = CardPicture(viewport._made(), 1, scene)
 
-        def seen(phrase: str) -> tuple[Narrowed | None, Answered, np.ndarray]:
-            """The answer, and the picture once it is narrowed."""
-            nonlocal state
-            query = compile_spoken(scene, space, [phrase])
-            asked = replace(state.asking.prompts[0], text=phrase, calibrated=query.threshold)
-            state = state.with_asking(prompts=(asked,))
-            viewport.ask((asked.key,), query, state.asking.revision)
-            view = None
-            for _ in range(600):
-                state = replace(state, now=state.now + 0.05)
-                viewport.update(state, SIZE, touched=0.0)
-                view = viewport.view(state) or view
-                whole = viewport.whole and not viewport.settling
-                if whole and view is not None and tuple(view.frame.alphas.shape) == SIZE[::-1]:
-                    break
-                time.sleep(0.01)
-            assert view is not None
-            parts = (view.relevance, view.frame, view.camera, view.query, view.revision)
-            done = Answer(1, view.keys, *parts, view.others, view.up, view.cuts, view.name).run(lambda: False)
-            told = [each for each in done if isinstance(each, Narrowed | Answered)]
-            narrowed = next((each for each in told if isinstance(each, Narrowed)), None)
-            if narrowed is not None:
-                viewport.narrow(narrowed.name, narrowed.relevance)
+    def seen(phrase: str) -> tuple[Narrowed | None, Answered, np.ndarray]:
+        """The answer, and the picture once it is narrowed."""
+        nonlocal state
+        query = compile_spoken(scene, space, [phrase])
+        asked = replace(state.asking.prompts[0], text=phrase, calibrated=query.threshold)
+        state = state.with_asking(prompts=(asked,))
+        viewport.ask((asked.key,), query, state.asking.revision)
+        view = None
+        for _ in range(600):
+            state = replace(state, now=state.now + 0.05)
             viewport.update(state, SIZE, touched=0.0)
-            pixels = viewport.seen()
-            assert pixels is not None
-            return narrowed, next(each for each in told if isinstance(each, Answered)), pixels.astype(int)
+            view = viewport.view(state) or view
+            whole = viewport.whole and not viewport.settling
+            if whole and view is not None and tuple(view.frame.alphas.shape) == SIZE[::-1]:
+                break
+            time.sleep(0.01)
+        assert view is not None
+        parts = (view.relevance, view.frame, view.camera, view.query, view.revision)
+        done = Answer(1, view.keys, *parts, view.others, view.up, view.cuts, view.name).run(lambda: False)
+        told = [each for each in done if isinstance(each, Narrowed | Answered)]
+        narrowed = next((each for each in told if isinstance(each, Narrowed)), None)
+        if narrowed is not None:
+            viewport.narrow(narrowed.name, narrowed.relevance)
+        viewport.update(state, SIZE, touched=0.0)
+        pixels = viewport.seen()
+        assert pixels is not None
+        return narrowed, next(each for each in told if isinstance(each, Answered)), pixels.astype(int)
 
-        _, _, plain = seen("armchair")
-        passes = dict(viewport.passes)
-        kept, _, red = seen("red armchair in front of the wall")
-        gone, none, blue = seen("blue armchair")
-        assert kept is not None and gone is not None and float(kept.relevance.max()) > 0.9
-        assert none.scores[0][2] == 0 and gone.notes[0][2] == "no armchair here looks blue"
-        assert abs(red - plain).max() <= 1 and abs(blue - plain).max() > 50, "a rounding; colours of heat"
-        again, _, whole = seen('"blue armchair"')
-        assert again is None and abs(whole - blue).max() > 50
-        after = dict(viewport.passes)
-        splatted = ("colour", "weights")
-        assert [after.get(kind) for kind in splatted] == [passes.get(kind) for kind in splatted]
-        viewport.release()
+    _, _, plain = seen("armchair")
+    passes = dict(viewport.passes)
+    kept, _, red = seen("red armchair in front of the wall")
+    gone, none, blue = seen("blue armchair")
+    assert kept is not None and gone is not None and float(kept.relevance.max()) > 0.9
+    assert none.scores[0][2] == 0 and gone.notes[0][2] == "no armchair here looks blue"
+    assert abs(red - plain).max() <= 1 and abs(blue - plain).max() > 50, "a rounding; colours of heat"
+    again, _, whole = seen('"blue armchair"')
+    assert again is None and abs(whole - blue).max() > 50
+    after = dict(viewport.passes)
+    splatted = ("colour", "weights")
+    assert [after.get(kind) for kind in splatted] == [passes.get(kind) for kind in splatted]

@@ -61,7 +61,6 @@ def test_a_report_of_rooms_and_a_scene_has_the_tables_that_documents_ask_for(
     words += ["--scene", str(scene_file)]
     words += ["--weights", str(tmp_path / "mini.safetensors"), "--small", str(tmp_path / "small")]
     monkeypatch.setattr("sys.argv", ["langflash", *words])
-    monkeypatch.setattr(study, "judge_room", None)  # the process beside this one does that
     assert main([*words, "--backend", "torch"]) == 0
     document = json.loads((tmp_path / "small" / "report.json").read_bytes())
     assert document["command"].endswith("--weights mini.safetensors --small small")

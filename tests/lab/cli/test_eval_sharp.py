@@ -2,7 +2,6 @@
 
 import json
 
-import numpy as np
 import pytest
 from PIL import Image
 
@@ -21,9 +20,9 @@ def pair(tmp_path):
 
 
 def test_a_pair_is_judged_kept_and_judged_beside_what_was_kept(run, pair, tmp_path):
-    kept, sheet, results = tmp_path / "kept", tmp_path / "new" / "sheet.png", tmp_path / "results"
+    kept, results = tmp_path / "kept", tmp_path / "results"
     words = ("lab", "eval", "sharp", pair, "--size", "56")
-    outcome = run(*words, "--keep", kept, "--sheet", sheet, "--results", results, "--json")
+    outcome = run(*words, "--keep", kept, "--results", results, "--json")
     assert outcome.code == 0, outcome.err
     document = outcome.json()
     assert document == json.loads((results / "sharp.json").read_text())
@@ -36,9 +35,6 @@ def test_a_pair_is_judged_kept_and_judged_beside_what_was_kept(run, pair, tmp_pa
     assert plain["detail"] < 1 and 0 < plain["opaque"] < 1
     file = kept / "plain" / "toy.langflash"
     assert document["measures"]["plain"]["once"]["bytes"] == file.stat().st_size
-    bands = np.asarray(Image.open(sheet))
-    # Photo, plain, normal, grid; whole and from near, each under a caption.
-    assert bands.shape[1] >= 4 * width and bands.shape[0] > 2 * (height - 3) and bands.std() > 10
     table = tmp_path / "new" / "table.md"
     again = run(*words[:3], *sorted(pair.iterdir()), *words[4:], "--beside", kept / "normal", "-o", table)
     assert again.code == 0 and again.out == table.read_text()

@@ -13,7 +13,7 @@ from langflash_core.errors import InputError, SceneFileError
 from langflash_core.lab.evaluation import sharp
 from langflash_core.lab.evaluation.drawing import drawn_frame
 from langflash_core.lab.evaluation.posed import Triple
-from langflash_core.lab.evaluation.sharp import PLAIN, Bench, make_scene, run_sharp
+from langflash_core.lab.evaluation.sharp import PLAIN, Bench, judge, make_scene, run_sharp
 from langflash_core.lab.evaluation.sharp_subjects import (
     pair_subjects,
     picture_of,
@@ -142,7 +142,7 @@ def test_ways_that_are_not_there_are_refused():
 
 def test_pictures_are_shown_with_the_photo_first(folder, program):
     seen = {}
-    run_sharp(posed_subjects(folder, TRIPLES[:1]), 1, Bench(render), shown=seen.__setitem__)
+    judge(next(iter(posed_subjects(folder, TRIPLES[:1]))), Bench(render), seen.__setitem__)
     assert list(seen["001-007"]) == ["photo", "plain", "normal", "grid"]
     assert {tuple(p.shape) for p in seen["001-007"].values()} == {(84, 112, 3)}
 

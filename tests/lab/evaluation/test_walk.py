@@ -1,7 +1,6 @@
 """Walks in more and more photos: which frames are photos, and that the truth scores as the truth."""
 
 import json
-import math
 import os
 import signal
 from dataclasses import replace
@@ -16,14 +15,12 @@ from langflash_core.errors import InputError
 from langflash_core.lab.evaluation import walk_scenes
 from langflash_core.lab.evaluation.tallies import Shelf
 from langflash_core.lab.evaluation.walk import OWN, TRUTH, Tally, flat, judge, pictured_at, run_walks, summary
-from langflash_core.lab.evaluation.walk_aside import nearest_angles
 from langflash_core.lab.evaluation.walk_scenes import Bench, made_of
 from langflash_core.lab.evaluation.walk_subjects import planned, posed_walks
 from langflash_core.lab.evaluation.walk_tables import beside_markdown, walk_markdown
 from langflash_core.lab.photos import PhotoFolder
-from langflash_core.lab.photos.fitting import FittedPhoto, fitted
 from langflash_core.splat import render
-from tests.lab.evaluation.real_photos import FOCAL, HEIGHT, WIDTH, knowing, write_folder
+from tests.lab.evaluation.real_photos import knowing, write_folder
 
 BENCH = Bench(render)
 PLAN = planned((2, 4), 2)
@@ -131,41 +128,6 @@ def test_the_truth_scores_as_the_truth(folder: PhotoFolder, monkeypatch):
     assert two["frames"]["1"]["alone_psnr"] == two["frames"]["1"]["psnr"]
     assert {title for _, title in seen} == {TRUTH, "2", "4", OWN}
     assert seen[1, TRUTH].shape == seen[1, "4"].shape
-
-
-def test_from_aside_the_truth_scores_as_the_truth(folder: PhotoFolder, monkeypatch):
-    """Of a wall two metres away, photos a few centimetres apart are at most 7 degrees aside."""
-    true_scenes(folder, monkeypatch)
-    (walk,) = posed_walks(folder, planned((2,), 1), 1)
-    assert [photo.id for photo in walk.others()] == ["004", "005", "006", "007"]
-    found = judge(walk, replace(BENCH, alone=False, aside=True))["photos"]["2"]
-    assert found["aside_0_photos"] == 4 and not any(key.startswith("aside_7") for key in found)
-    assert found["aside_0_psnr"] > 18 and found["aside_0_depth"] < 1e-2 and found["aside_0_bright"] < 0.02
-    true_scenes(folder, monkeypatch, nearer=0.7)
-    near = judge(walk, replace(BENCH, alone=False, aside=True))["photos"]["2"]
-    assert near["aside_0_depth"] > 0.2 and near["aside_0_psnr"] < found["aside_0_psnr"] - 1
-    assert found["own_psnr"] > 20
-
-
-def test_angles_at_a_surface_are_those_of_the_nearest_photo_that_sees_it(folder: PhotoFolder):
-    size = (WIDTH, HEIGHT)
-
-    def seen(number: int) -> tuple[FittedPhoto, np.ndarray]:
-        photo = folder.photo(f"{number:03d}")
-        assert photo.pose is not None
-        return fitted(photo, size), np.linalg.inv(photo.pose.numpy())
-
-    target = seen(7)
-    angles = nearest_angles(target, [seen(1), seen(4)])
-    row, column = HEIGHT // 2, WIDTH // 2 - 20
-    x = (column + 0.5 - WIDTH / 2) / FOCAL * 2.0  # metres from what is straight ahead, 2 metres away
-    ahead = math.degrees(math.atan2(x + 3 * 0.06, 2.0) - math.atan2(x, 2.0))
-    assert float(angles[row, column]) == pytest.approx(ahead, abs=0.02)  # photo 4, three steps aside
-    hidden = replace(target[0], depths=torch.where(torch.arange(WIDTH) < 30, 0.0, target[0].depths))
-    assert torch.isinf(nearest_angles((hidden, target[1]), [seen(4)])[:, :30]).all()
-    nearer = seen(4)
-    before = replace(nearer[0], depths=0.5 * nearer[0].depths)
-    assert torch.isinf(nearest_angles(target, [(before, nearer[1])])).all()  # it sees something before it
 
 
 def test_what_is_wrong_is_told(folder: PhotoFolder, monkeypatch):

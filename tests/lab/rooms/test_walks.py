@@ -48,7 +48,7 @@ def walk_of(pack: Pack, renderer: RoomRenderer, camcorder: Camcorder):
     return walk
 
 
-def test_exposure_and_blur_change_photos_and_never_what_is_kept(pack: Pack, renderer: RoomRenderer):
+def test_exposure_changes_photos_and_never_what_is_kept(pack: Pack, renderer: RoomRenderer):
     plain = walk_of(pack, renderer, Camcorder(times=1))
     kept, photos = plain.kept(1).image, [plain.photo(n).image for n in (0, 2, 4)]
     changed = walk_of(pack, renderer, Camcorder(exposure=2.0, times=1))
@@ -58,13 +58,6 @@ def test_exposure_and_blur_change_photos_and_never_what_is_kept(pack: Pack, rend
     )  # (3, RGB)
     assert np.array_equal(changed.kept(1).image, kept)
     assert np.ptp(stops, axis=0).min() > 0.2 and 0.01 < np.ptp(stops, axis=1).max() < 0.5
-    shaken = walk_of(pack, renderer, Camcorder(blur=1.5, times=1))
-    sharp, blurred = (
-        np.abs(np.diff(p.astype(float), axis=1)).mean() for p in (photos[0], shaken.photo(0).image)
-    )
-    assert blurred < 0.8 * sharp and np.array_equal(shaken.kept(1).image, kept)
-    depths, same = plain.photo(0).depths, shaken.photo(0).depths
-    assert depths is not None and same is not None and np.array_equal(depths, same)
 
 
 def test_a_frame_knows_where_it_was_taken(pack: Pack, renderer: RoomRenderer):

@@ -4,16 +4,12 @@ import shlex
 import sys
 import time
 from argparse import Namespace
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, nullcontext, suppress
-from multiprocessing import get_context
 from pathlib import Path
 from typing import TYPE_CHECKING, TextIO
 
-from langflash_core.__main__ import in_program
 from langflash_core.base.files import check_folder, make_folder, readable_file, write_atomically
 from langflash_core.base.running import Progress
-from langflash_core.errors import InputError, LangFlashError, SceneFileError
+from langflash_core.errors import InputError, SceneFileError
 from langflash_core.lab.photos import PhotoFolder, open_folder
 
 from ....bench.machine import host
@@ -60,7 +56,8 @@ def report(args: Namespace, out: TextIO) -> None:
     with ProgressBar() as progress:
         drawn = [] if args.scene is None else [_drawing(args.scene, progress)]  # while nothing else runs
         with open_renderer(args.backend) as renderer:
-            found = _judged(args, judges, _workplace(args, renderer, progress)) + drawn
+            place = _workplace(args, renderer, progress)
+            found = [judge(place) for judge in judges] + drawn
             drawn_by = renderer.backend
     name = args.weights.name if args.weights else args.preset
     made = report_page.Report(
@@ -85,16 +82,6 @@ def report(args: Namespace, out: TextIO) -> None:
     print(f"{args.output / 'report.html'}: {told}", file=out)
 
 
-def _judged(
-    args: Namespace, judges: "Sequence[Callable[[Workplace], Section]]", place: "Workplace"
-) -> "list[Section]":
-    """A section of each, the first here, the others beside it."""
-    with _neighbour(args) if len(judges) > 1 else nullcontext():
-        first = [judge(place) for judge in judges[:1]]
-    # what the neighbour kept is read; where it failed, this process meets the reason itself
-    return first + [judge(place) for judge in judges[1:]]
-
-
 def _drawing(path: Path, progress: Progress) -> "Section":
     """A scene drawn in every way that `langflash bench` knows."""
     from langflash_core.lab.evaluation.report_drawing import drawing_section
@@ -103,53 +90,6 @@ def _drawing(path: Path, progress: Progress) -> "Section":
 
     case = scene_case(path.stem, open_scene(path), None, FRAMES, None)
     return drawing_section(measured_cases([case], None, progress))
-
-
-@contextmanager
-def _neighbour(args: Namespace) -> Iterator[None]:
-    """A process beside what is done here judges all sections but the first into the same work folder: it has
-    ended when this has, at once where this failed."""
-    whole = ("cli.lab.evals.report", "judge_the_rest", args)
-    process = get_context("spawn").Process(target=in_program, args=whole, daemon=True)
-    process.start()
-    try:
-        with _half_of_the_threads():
-            yield
-        process.join()
-    finally:
-        process.kill()
-        process.join()
-
-
-def judge_the_rest(args: Namespace) -> None:
-    """What the neighbour does."""
-    from langflash_core.lab.evaluation.report import plans
-
-    with (
-        suppress(LangFlashError, KeyboardInterrupt),
-        open_renderer(args.backend) as renderer,
-        _half_of_the_threads(),
-    ):
-        place = _workplace(args, renderer, _silent)
-        for judge in plans(_sources(args))[1:]:
-            judge(place)
-
-
-def _silent(stage: str, share: float) -> None:
-    """The process in front tells how far it is."""
-
-
-@contextmanager
-def _half_of_the_threads() -> Iterator[None]:
-    """Two processes share the cores."""
-    import torch
-
-    threads = torch.get_num_threads()
-    torch.set_num_threads(max(1, threads // 2))
-    try:
-        yield
-    finally:
-        torch.set_num_threads(threads)
 
 
 def _sources(args: Namespace) -> "Sources":

@@ -24,13 +24,14 @@ Versions = Sequence[tuple[str, Path]]
 @dataclass(frozen=True)
 class Results:
     """Of one judgement. command: `eval COMMAND`; file: in a folder of results, for the numbers; keys: that it
-    has; alike: what to say where two results have no case in common; sheet: of the pictures of versions."""
+    has; alike: what to say where two results have no case in common; sheet: of pictures of versions, if
+    kept."""
 
     command: str
     file: str
     keys: frozenset[str]
     alike: str
-    sheet: Callable[[Versions], Image.Image]
+    sheet: Callable[[Versions], Image.Image] | None = None
 
     def write(self, folder: Path, result: dict) -> None:
         """The numbers of a run."""
@@ -53,7 +54,13 @@ class Results:
         return found
 
     def draw(self, path: Path, versions: Versions) -> None:
-        """A sheet of the pictures that folders of results hold."""
+        """A sheet of the pictures that folders of results hold.
+
+        Raises:
+            InputError: this judgement keeps no pictures.
+        """
+        if self.sheet is None:
+            raise InputError(f"eval {self.command} keeps no pictures; leave --sheet out")
         write_sheet(path, self.sheet([(title, folder / PICTURES) for title, folder in versions]))
 
     def beside(self, args: Namespace, markdown: Callable[[dict, dict], str], out: TextIO) -> None:
@@ -78,7 +85,7 @@ def check_files(args: Namespace) -> None:
     """
     if args.output is not None:
         check_output_file(args.output, (".md",))
-    if args.sheet is not None:
+    if getattr(args, "sheet", None) is not None:
         check_output_file(args.sheet, (".png",), option="--sheet")
 
 

@@ -15,7 +15,7 @@ from ...renderers import open_renderer
 from ...report import ProgressBar, write_tables
 from ..photos import opened_folder
 from ..shared import colour_only, opened_lpips
-from .results import check_files, write_sheet
+from .results import check_files
 
 if TYPE_CHECKING:
     from langflash_core.lab.evaluation.sharp import Bench
@@ -36,21 +36,16 @@ def sharp(args: Namespace, out: TextIO) -> None:
     from langflash_core.lab.evaluation.sharp import run_sharp
     from langflash_core.lab.evaluation.sharp_tables import sharp_markdown
 
-    from ..sheets.sharp import SharpSheet
-
-    sheet = SharpSheet()
     with (
         _subjects(args) as (subjects, count),
         open_renderer(args.backend) as renderer,
         ProgressBar() as progress,
     ):
         bench = _bench(args, colour_only(renderer))
-        result = run_sharp(subjects, count, bench, progress=progress, shown=sheet.add)
+        result = run_sharp(subjects, count, bench, progress=progress)
     if args.results is not None:
         make_folder(args.results)
         write_atomically(args.results / NUMBERS, json.dumps(result, indent=1).encode())
-    if args.sheet is not None:
-        write_sheet(args.sheet, sheet.image())
     write_tables(args, result, sharp_markdown(result), out)
 
 

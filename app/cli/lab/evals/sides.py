@@ -1,32 +1,21 @@
 """`lab eval sides`: scenes seen from aside."""
 
 from argparse import Namespace
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TextIO
 
-from PIL import Image
-
 from langflash_core.base.files import check_folder, readable_file
-from langflash_core.errors import InputError, WeightsError
-from langflash_core.lab.evaluation.labelled import Render
-from langflash_core.lab.evaluation.side_subjects import Case
+from langflash_core.errors import InputError
 from langflash_core.lab.rooms import RoomRenderer, load_pack
-from langflash_core.types import Scene
 
 from ...renderers import open_renderer
 from ...report import ProgressBar, write_tables
 from ..photos import opened_folder
-from ..shared import colour_only
-from .results import PICTURES, Results, Versions, check_files
+from ..shared import colour_only, opened_lpips
+from .results import Results, check_files
 
 ROOMS, PAIRS = 100, 40
-
-
-def _sheet(versions: Versions) -> Image.Image:
-    from ..sheets.sides import side_sheet
-
-    return side_sheet(versions)
 
 
 RESULTS = Results(
@@ -34,7 +23,6 @@ RESULTS = Results(
     "sides.json",
     frozenset({"cases", "by_look"}),
     "scene in common; make both with the same rooms or pairs",
-    _sheet,
 )
 
 
@@ -51,51 +39,24 @@ def sides(args: Namespace, out: TextIO) -> None:
     check_files(args)
     if args.results is not None:
         check_folder(args.results, "--results")
-    if args.sheet is not None and (args.results is None or args.pack is None):
-        raise InputError("--sheet shows what --results keeps of rooms; give a furniture pack and --results")
-    from langflash_core.lab.evaluation.lpips import Lpips
     from langflash_core.lab.evaluation.side_tables import sides_markdown
     from langflash_core.lab.evaluation.sides import run_sides
 
-    lpips = None if args.lpips is None else Lpips(readable_file(args.lpips, "LPIPS file", WeightsError))
+    lpips = opened_lpips(args.lpips)
     with _cases(args) as (cases, count), open_renderer(args.backend) as renderer, ProgressBar() as progress:
-        render = colour_only(renderer)
         result = run_sides(
             cases,
             count,
-            render,
+            colour_only(renderer),
             args.weights,
             preset=args.preset,
             size=args.size,
             lpips=lpips,
             progress=progress,
-            made=_pictures(args, render),
         )
-        if args.results is not None and args.pack is not None:
-            from ..sheets.sides import draw_pairs
-
-            draw_pairs(args.results / PICTURES, render, args.weights)
     if args.results is not None:
         RESULTS.write(args.results, result)
-    if args.sheet is not None and args.results is not None:
-        RESULTS.draw(args.sheet, [("drawn", args.results)])
     write_tables(args, result, sides_markdown(result), out)
-
-
-def _pictures(args: Namespace, render: Render) -> Callable[[Case, Scene], None]:
-    """Keeps what the first rooms show, where results are kept."""
-    shown = 0
-
-    def made(case: Case, scene: Scene) -> None:
-        nonlocal shown
-        from ..sheets.sides import ROOMS as SHOWN
-        from ..sheets.sides import draw_room
-
-        if args.results is not None and args.pack is not None and shown < SHOWN:
-            draw_room(args.results / PICTURES, shown, case, scene, render)
-            shown += 1
-
-    return made
 
 
 @contextmanager

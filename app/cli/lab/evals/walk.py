@@ -3,19 +3,11 @@
 from argparse import Namespace
 from collections.abc import Iterator
 from contextlib import contextmanager
-from importlib.util import find_spec
-from pathlib import Path
 from typing import TYPE_CHECKING, TextIO
 
 from PIL import Image
 
-from langflash_core.base.files import (
-    check_folder,
-    check_output_file,
-    make_folder,
-    readable_file,
-    write_atomically,
-)
+from langflash_core.base.files import check_folder, readable_file
 from langflash_core.errors import InputError
 from langflash_core.lab.rooms import RoomRenderer, load_pack
 
@@ -34,8 +26,8 @@ ROOMS, STRETCHES = 20, 4
 WALKS = "walks"
 """The folder of results that keeps single walks."""
 OPTIONS = (
-    "size", "set", "exposure", "blur", "step", "assume_lens", "no_own", "align", "memory",
-    "colmap", "seen_aside", "depth_unit", "crop", "intrinsics", "passers", "screens",
+    "size", "set", "exposure", "step", "assume_lens", "no_own", "align", "memory",
+    "colmap", "depth_unit", "crop", "intrinsics", "passers", "screens",
 )  # fmt: skip
 """By which numbers of a walk change."""
 
@@ -79,8 +71,6 @@ def walk(args: Namespace, out: TextIO) -> None:
         RESULTS.write(args.results, result)
     if args.sheet is not None and args.results is not None:
         RESULTS.draw(args.sheet, [("drawn", args.results)])
-    if args.plot is not None:
-        _write_plot(args.plot, result)
     write_tables(args, result, walk_markdown(result), out)
 
 
@@ -88,21 +78,13 @@ def _check(args: Namespace) -> None:
     """What can be known before any work."""
     if (args.pack is None) == (args.folder is None):
         raise InputError("give either a furniture pack or a folder with --posed; not both, not none")
-    if args.folder is not None and (args.exposure or args.blur or args.passers or args.screens):
+    if args.folder is not None and (args.exposure or args.passers or args.screens):
         raise InputError(
-            "--exposure, --blur, --passers and --screens change drawn rooms; leave them out with --posed"
-        )
-    if args.seen_aside and args.folder is None:
-        raise InputError(
-            "--seen-aside judges by other photos of a folder; give one with --posed, or leave it out"
+            "--exposure, --passers and --screens change drawn rooms; leave them out with --posed"
         )
     check_files(args)
     if args.results is not None:
         check_folder(args.results, "--results")
-    if args.plot is not None:
-        check_output_file(args.plot, (".png",), option="--plot")
-        if find_spec("matplotlib") is None:
-            raise InputError("--plot needs matplotlib; pip install 'langflash[plots]' brings it")
     if args.sheet is not None and args.results is None:
         raise InputError("--sheet shows what --results keeps; give --results, too")
     if args.colmap:
@@ -131,7 +113,6 @@ def _bench(args: Namespace, renderer: Renderer) -> "Bench":
         lpips=opened_lpips(args.lpips),
         memory=args.memory,
         colmap=args.colmap,
-        aside=args.seen_aside,
     )
 
 
@@ -151,13 +132,6 @@ def _shelf(args: Namespace, plan: "Plan", bench: "Bench") -> "Shelf":
     return Shelf(args.results / WALKS, key, Tally)
 
 
-def _write_plot(path: Path, result: dict) -> None:
-    from langflash_core.lab.evaluation.walk_plot import walk_png
-
-    make_folder(path.parent)
-    write_atomically(path, walk_png(result))
-
-
 @contextmanager
 def _walks(args: Namespace, plan: "Plan") -> "Iterator[tuple[Iterator[Walk], int]]":
     """What is judged, and how much of it."""
@@ -171,8 +145,6 @@ def _walks(args: Namespace, plan: "Plan") -> "Iterator[tuple[Iterator[Walk], int
         yield posed_walks(folder, plan, count, args.step), count
         return
     pack, count = load_pack(readable_file(args.pack, "furniture pack", InputError)), args.limit or ROOMS
-    camcorder = Camcorder(
-        args.exposure or 0.0, args.blur or 0.0, passers=args.passers or 0, screens=args.screens or 0
-    )
+    camcorder = Camcorder(args.exposure or 0.0, passers=args.passers or 0, screens=args.screens or 0)
     with RoomRenderer(pack) as drawer:
         yield room_walks(pack, drawer, plan, camcorder=camcorder, kind=args.set, count=count), count

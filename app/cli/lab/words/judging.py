@@ -117,16 +117,7 @@ def _add_posed(actions) -> None:
     command.add_argument(
         "--apart", type=whole_count, nargs="+", metavar="N", help="numbers between two (default: 6 12 18 24)"
     )
-    command.add_argument(
-        "--photos",
-        type=whole_count,
-        nargs="+",
-        metavar="N",
-        help="instead of pairs, scenes of 2 4 8 ... photos of the same place",
-    )
-    command.add_argument(
-        "--limit", type=whole_count, metavar="N", help="so many pairs (default: 40), or stretches (6)"
-    )
+    command.add_argument("--limit", type=whole_count, metavar="N", help="so many pairs (default: 40)")
     _add_fitting(command)
     _add_judging(command)
 
@@ -165,7 +156,6 @@ def _add_sides(actions) -> None:
     command.add_argument(
         "--results", type=Path, metavar="DIR", help="also keep every scene's numbers, for beside"
     )
-    command.add_argument("--sheet", type=Path, metavar="IMG", help="also six scenes from aside, as .png")
     _add_judging(command)
 
 
@@ -202,9 +192,6 @@ def _add_sharp(actions) -> None:
     )
     command.add_argument("--lpips", type=Path, metavar="FILE", help="LPIPS weights of VGG-16, .safetensors")
     command.add_argument("--results", type=Path, metavar="DIR", help="also keep every scene's numbers")
-    command.add_argument(
-        "--sheet", type=Path, metavar="IMG", help="also photos and scenes at 100 and 300 %%, as .png"
-    )
     _add_judging(command)
 
 
@@ -252,9 +239,6 @@ def _add_walk(actions) -> None:
         "--exposure", type=above_zero, metavar="EV", help="each photo of a room is off by up to so many stops"
     )
     command.add_argument(
-        "--blur", type=above_zero, metavar="DEG", help="a hand turns so far in each photo of a room"
-    )
-    command.add_argument(
         "--passers", type=whole_count, metavar="N", help="somebody stands in so many photos of a room"
     )
     command.add_argument(
@@ -268,9 +252,6 @@ def _add_walk(actions) -> None:
         "--memory", action="store_true", help="each scene in a process of its own, whose memory is told"
     )
     command.add_argument("--colmap", action="store_true", help="COLMAP's cameras beside; needs pycolmap")
-    command.add_argument(
-        "--seen-aside", action="store_true", help="also from aside, by the other photos of the folder"
-    )
     _add_fitting(command)
     command.add_argument(
         "--results",
@@ -279,9 +260,6 @@ def _add_walk(actions) -> None:
         help="keep every walk there, for beside, and go on from it; one folder for each version",
     )
     command.add_argument("--sheet", type=Path, metavar="IMG", help="also kept frames and scenes, as .png")
-    command.add_argument(
-        "--plot", type=Path, metavar="IMG", help="also time and memory against photos, as .png"
-    )
     _add_judging(command)
 
 

@@ -7,6 +7,7 @@ from ... import commands as do
 from ...editing import commands as edit
 from ...kit import theme, widgets
 from ...kit.look import Look
+from ...scene import camera
 from ...scene import commands as show
 from ...state import State
 from .. import commands as ask
@@ -14,7 +15,6 @@ from .. import lifting
 from ..state import Prompt, usable
 from . import entry, known, parts, scores
 
-_HIGH = 760.0  # design pixels of a window in which what there is to ask leaves room for answers
 _SWATCH = imgui.ColorEditFlags_.no_inputs | imgui.ColorEditFlags_.no_label | imgui.ColorEditFlags_.no_tooltip
 
 
@@ -28,7 +28,7 @@ def draw(state: State, look: Look) -> list[do.Command]:
         issued += _row(state, prompt, look)
         imgui.pop_id()
     issued += entry.tools(state, look)
-    first = not state.asking.asked or imgui.get_io().display_size.y >= look.px(_HIGH)
+    first = not state.asking.asked or widgets.high(look)
     if first:  # what there is to ask
         issued += known.draw(state, look)
     issued += scores.draw(state, look)
@@ -65,7 +65,7 @@ def _row(state: State, prompt: Prompt, look: Look) -> list[do.Command]:
     issued = _phrase(state, prompt, look)
     issued += _row_buttons(state, prompt, look)
     if prompt.text.strip() and prompt.visible and state.scene.info is not None and state.scene.info.num_atoms:
-        issued += _verdict(prompt, look)
+        issued += _verdict(state, prompt, look)
     shown = state.asking.active_prompt
     if shown is not None and shown.key == prompt.key and len(state.asking.asked) > 1:
         end = ImVec2(corner.x - look.px(6), imgui.get_cursor_screen_pos().y - look.px(10))
@@ -118,7 +118,7 @@ def _row_buttons(state: State, prompt: Prompt, look: Look) -> list[do.Command]:
     return issued
 
 
-def _verdict(prompt: Prompt, look: Look) -> list[do.Command]:
+def _verdict(state: State, prompt: Prompt, look: Look) -> list[do.Command]:
     """Found or not with the score, then the threshold slider."""
     issued: list[do.Command] = []
     imgui.indent(look.px(36))
@@ -151,6 +151,10 @@ def _verdict(prompt: Prompt, look: Look) -> list[do.Command]:
     if widgets.quiet_button(f"{fa.ICON_FA_ROTATE_LEFT}##calibrated", "Back to the calibrated threshold"):
         issued.append(ask.SetThreshold(prompt.key, None))
     imgui.end_disabled()
+    if prompt.found is False and prompt.photo not in (None, state.scene.view):
+        if imgui.small_button(f"Photo {prompt.photo + 1} shows it##where"):
+            issued.append(camera.JumpTo(prompt.photo))
+        widgets.tooltip("Go to the photo that shows most of it")
     if prompt.reading:
         issued += _reading(prompt, look)
     if prompt.note:

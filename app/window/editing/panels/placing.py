@@ -3,7 +3,8 @@
 from imgui_bundle import icons_fontawesome_6 as fa
 from imgui_bundle import imgui
 
-from langflash_core.scene.changes import SCALES, Moved
+from langflash_core.scene.changes import Moved
+from langflash_core.scene.settings import CHANGES
 
 from ... import commands as do
 from ...kit import theme, widgets
@@ -61,7 +62,7 @@ def _fields(state: State, pivot: placing.Spot, look: Look, right: float) -> list
             imgui.same_line(0, look.px(5))
         imgui.set_next_item_width(look.px(_FIELD))
         speed = unit * _SPEEDS[editing.handle]
-        low, high = SCALES if editing.handle is Handle.SCALE else (0.0, 0.0)
+        low, high = CHANGES.scales if editing.handle is Handle.SCALE else (0.0, 0.0)
         edited, value = imgui.drag_float(f"##{'xyz'[place]}", number, speed, low, high, digits)
         widgets.tooltip("Drag, or double-click and type; relative to where the selection is now")
         if edited:
@@ -84,9 +85,10 @@ def draw_tint(state: State, tint: Tint, look: Look, right: float) -> list[do.Com
     flags = imgui.ColorEditFlags_.no_inputs | imgui.ColorEditFlags_.no_label
     repainted, colour = imgui.color_edit3("##tint", list(tint.colour), flags)
     widgets.tooltip("The new colour; light and shade are kept")
-    text, tip, width = f"{100 * tint.strength:.0f} %", "Strength of the colour", look.px(150)
-    widgets.go_on(width, right)
-    moved, strength = widgets.slider("##strength", tint.strength, (0.0, 1.0), text, tip, width)
+    label, text, tip = "Strength##strength", f"{100 * tint.strength:.0f} %", "Strength of the colour"
+    width = look.px(150)
+    widgets.go_on(widgets.named(label, width), right)
+    moved, strength = widgets.slider(label, tint.strength, (0.0, 1.0), text, tip, width)
     widgets.go_on(widgets.button_width("Recolour"), right, look.px(14))
     issued: list[do.Command] = []
     if repainted or moved:

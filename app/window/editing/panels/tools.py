@@ -3,7 +3,7 @@
 from imgui_bundle import ImVec2, imgui
 from imgui_bundle import icons_fontawesome_6 as fa
 
-from langflash_core.mending.recipes import MOST_MARGIN
+from langflash_core.mending.settings import RECIPE_DEFAULTS
 from langflash_core.scene.edits import Combine
 
 from ... import commands as do
@@ -52,6 +52,7 @@ _VIEWS = 92.0  # that the viewpoints below it take
 _MARGIN = 12.0
 _TALL = 6.0  # height of what a selection can do in two lines, in lines of text
 _REACH = 104.0  # width of the slider of how far a selection grows
+_STEPS = "Steps"  # its name
 _LEVELS = 130.0  # of that of how much of a thing is selected
 _GROWING = _REACH + 130.0  # and of the buttons before it
 _MARGIN_SLIDER = 116.0  # of how much around a part is hidden with it
@@ -202,10 +203,10 @@ def _options(state: State, look: Look, right: float) -> list[do.Command]:
 
 def _radius(state: State, look: Look, right: float) -> list[do.Command]:
     """How large the brush is."""
-    tip, width = "Radius of the brush, pixels  ([ and ])", look.px(150)
-    widgets.go_on(width, right, look.px(14))
+    label, tip, width = "Radius##radius", "Radius of the brush, pixels  ([ and ])", look.px(150)
+    widgets.go_on(widgets.named(label, width), right, look.px(14))
     text = f"{state.editing.radius:.0f} px"
-    changed, radius = widgets.slider("##radius", state.editing.radius, RADIUS_RANGE, text, tip, width)
+    changed, radius = widgets.slider(label, state.editing.radius, RADIUS_RANGE, text, tip, width)
     return [point.SetRadius(radius)] if changed else []
 
 
@@ -245,7 +246,7 @@ def _selection(state: State, look: Look, right: float) -> list[do.Command]:
     imgui.push_style_var(imgui.StyleVar_.item_spacing, look.vec(4, 4))
     imgui.same_line(begin + imgui.calc_text_size(f"{count:,} selected").x + look.px(14))
     issued += _actions(right)
-    widgets.go_on(look.px(_GROWING), right, look.px(14))  # all of it
+    widgets.go_on(widgets.named(_STEPS, look.px(_GROWING)), right, look.px(14))  # all of it
     issued += _growing(state, look)
     if editing.reached is not None:
         issued += _levels(editing.reached, look, right)
@@ -258,10 +259,10 @@ def _levels(reached: Reached, look: Look, right: float) -> list[do.Command]:
     last = len(reached.levels) - 1
     if not last:
         return []
-    width, text = look.px(_LEVELS), f"{reached.level + 1}/{last + 1}"
-    widgets.go_on(width, right, look.px(14))
+    label, width, text = "Size##level", look.px(_LEVELS), f"{reached.level + 1}/{last + 1}"
+    widgets.go_on(widgets.named(label, width), right, look.px(14))
     tip = "Less or more: part, thing, group  ([ and ], or Ctrl+wheel)"
-    changed, level = widgets.slider("##level", reached.level, (0.0, float(last)), text, tip, width)
+    changed, level = widgets.slider(label, reached.level, (0.0, float(last)), text, tip, width)
     return [things.SetLevel(round(level))] if changed else []
 
 
@@ -304,7 +305,8 @@ def _growing(state: State, look: Look) -> list[do.Command]:
         widgets.tooltip(f"Grow, but only over '{active.text.strip()}'")
     imgui.same_line()
     tip, width = "How far to grow, in steps (a step is the distance between neighbours)", look.px(_REACH)
-    changed, reach = widgets.slider("##reach", editing.reach, REACH_RANGE, f"{editing.reach:.0f}", tip, width)
+    text = f"{editing.reach:.0f}"
+    changed, reach = widgets.slider(f"{_STEPS}##reach", editing.reach, REACH_RANGE, text, tip, width)
     if changed:
         issued.append(point.SetReach(round(reach)))
     return issued
@@ -322,10 +324,10 @@ def _floaters(state: State, found: Floaters, look: Look, right: float) -> list[d
         return issued
     count = len(found.mask(marks.visible))
     imgui.text(f"{count:,} to remove" + (" in the selection" if found.within is not None else ""))
-    tip, width = "Strength: how much is removed", look.px(170)
-    widgets.go_on(width, right, look.px(14))
+    label, tip, width = "Strength##strength", "How much is removed", look.px(170)
+    widgets.go_on(widgets.named(label, width), right, look.px(14))
     text = f"{100 * found.strength:.0f} %"
-    changed, strength = widgets.slider("##strength", found.strength, (0.0, 1.0), text, tip, width)
+    changed, strength = widgets.slider(label, found.strength, (0.0, 1.0), text, tip, width)
     if changed:
         issued.append(edit.SetStrength(strength))
     return issued + _end_floaters(count, found.open, look, right)
@@ -358,15 +360,11 @@ def _hiding(state: State, asked: Hiding, look: Look, right: float) -> list[do.Co
 
 def _margin(state: State, asked: Hiding, look: Look, right: float) -> list[do.Command]:
     """How much around the selection is hidden with it, and how many Gaussians that are."""
-    tip = "Margin: how much around it is hidden too, as a share of a photo's longer side"
-    name, text = "Margin", f"{100 * asked.margin:.1f} %"
-    beside = imgui.calc_text_size(f"{name}{100 * MOST_MARGIN:.1f} %").x + 2 * imgui.get_style().item_spacing.x
-    widgets.go_on(look.px(_MARGIN_SLIDER) + beside, right, look.px(14))
-    imgui.align_text_to_frame_padding()
-    imgui.text(name)
-    imgui.same_line()
-    limits = (0.0, MOST_MARGIN)
-    changed, margin = widgets.slider("##margin", asked.margin, limits, text, tip, look.px(_MARGIN_SLIDER))
+    tip = "How much around it is hidden too, as a share of a photo's longer side"
+    label, text = "Margin##margin", f"{100 * asked.margin:.1f} %"
+    limits = (0.0, RECIPE_DEFAULTS.most_margin)
+    widgets.go_on(widgets.named(label, look.px(_MARGIN_SLIDER)), right, look.px(14))
+    changed, margin = widgets.slider(label, asked.margin, limits, text, tip, look.px(_MARGIN_SLIDER))
     found = None if state.editing.marks is None else asked.mask(state.editing.marks)
     words = "looking ..." if found is None else f"{len(found):,} in all"
     count = 0 if state.scene.info is None else state.scene.info.num_gaussians

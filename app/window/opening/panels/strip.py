@@ -3,12 +3,12 @@
 from imgui_bundle import ImVec2, imgui
 from imgui_bundle import icons_fontawesome_6 as fa
 
+from langflash_core.images.settings import PHOTO_LIMITS
 from langflash_core.images.strip import ELSEWHERE, REASONS, REPEAT, Still
 
 from ... import commands as do
 from ...kit import theme, widgets
 from ...kit.look import Look
-from ...scene.drops import FILM_PHOTOS
 from ...state import State
 from .. import commands as opening
 from ..state import Film, small
@@ -66,7 +66,7 @@ def _number(state: State, film: Film, look: Look) -> list[do.Command]:
     imgui.same_line()
     tip = "The sharpest frames, spread evenly along the camera's path"
     if widgets.quiet_button("Reset to suggested", tip):
-        issued.append(opening.ProposeFrames(min(most, FILM_PHOTOS)))
+        issued.append(opening.ProposeFrames(min(most, PHOTO_LIMITS.film_photos)))
     return issued
 
 

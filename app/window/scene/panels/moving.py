@@ -23,7 +23,7 @@ from .. import camera, near
 from ..near import UNHURRIED, flown, looked, orbited
 from ..state import Hold
 
-TURN = math.radians(0.3)  # per pixel at scale 1
+TURN = math.radians(0.3)  # per pixel at scale 1, where there are no photos
 ZOOM = 0.9  # of the distance, per notch of the wheel
 SPEED = 0.9  # of the distance to the pivot, per second
 NEARBY = 2.0  # of the distance to the nearest surface: no farther counts for the speed
@@ -67,7 +67,7 @@ def _dragged(state: State, look: Look, size: ImVec2) -> tuple[Pose, float]:
     # On a slow machine the way to the place and the press share a frame: that way is no drag.
     if not held or imgui.is_item_activated() or not (dx or dy):
         return pose, 0.0
-    hold, turn = state.scene.hold or Hold(), TURN / look.scale
+    hold, turn = state.scene.hold or Hold(), _turn(state, look, size)
     least = 1.0 if hold.insists else 0.0
     if _held(1) and pose.span is None:
         pose, done = looked(state, pose, -dx * turn, -dy * turn, least)
@@ -77,7 +77,6 @@ def _dragged(state: State, look: Look, size: ImVec2) -> tuple[Pose, float]:
         unit = poses.units_per_pixel(_at_pivot(pose, hold), round(size.x), round(size.y))
         pose, done = flown(state, pose, -dx * unit, -dy * unit, 0.0, least)
     elif hold.looks:
-        turn = _following(pose, size)
         pose, done = looked(state, pose, dx * turn, dy * turn, least)
     else:
         pose, done = orbited(state, pose, -dx * turn, -dy * turn, hold.pivot, least)
@@ -92,8 +91,12 @@ def _at_pivot(pose: Pose, hold: Hold) -> Pose:
     return replace(pose, reach=depth) if depth > poses.NEAREST else pose
 
 
-def _following(pose: Pose, size: ImVec2) -> float:
-    """Radians a pixel with which the picture's middle follows the hand."""
+def _turn(state: State, look: Look, size: ImVec2) -> float:
+    """Radians a pixel: the picture's middle follows the hand, around a pivot what is far behind it; faster
+    around what no photos were taken of, where every side is worth as much."""
+    pose, info = state.scene.pose, state.scene.info
+    if pose.span is not None or info is None or not info.views:
+        return TURN / look.scale
     return 1 / float(poses.intrinsics(pose, max(round(size.x), 1), max(round(size.y), 1))[0, 0])
 
 
@@ -107,10 +110,10 @@ def _scrolled(pose: Pose, state: State, look: Look, size: ImVec2) -> Pose:
     if io.key_shift:
         unit = poses.units_per_pixel(pose, round(size.x), round(size.y)) * look.scale
         return flown(state, pose, -across * unit, -along * unit, 0.0, UNHURRIED)[0]
+    turn = _turn(state, look, size) * look.scale
     if near.at_photo(state):
-        turn = _following(pose, size) * look.scale
         return looked(state, pose, -across * turn, -along * turn, UNHURRIED)[0]
-    return orbited(state, pose, across * TURN, along * TURN, least=UNHURRIED)[0]
+    return orbited(state, pose, across * turn, along * turn, least=UNHURRIED)[0]
 
 
 def _held(button: int) -> bool:

@@ -41,8 +41,9 @@ def draw(state: State, look: Look) -> list[do.Command]:
     else:
         _hint(look)
     issued += _row(state, look)
+    short = bool(state.asking.asked) and not widgets.high(look)
     for sentence in _sentences(state):
-        _warning(sentence)
+        _warning(sentence, short)
     stages.draw(state, look)
     return issued
 
@@ -372,8 +373,11 @@ def _bar(fraction: float, corner: ImVec2, width: float, look: Look) -> None:
         canvas.add_rect_filled(corner, end, widgets.u32(colour), look.px(2))
 
 
-def _warning(sentence: str) -> None:
+def _warning(sentence: str, short: bool = False) -> None:
+    """short: as much of it as a line holds, and all on hover."""
     with widgets.colours(text=theme.ACCENT):
         imgui.text(fa.ICON_FA_TRIANGLE_EXCLAMATION)
     imgui.same_line()
-    widgets.muted(sentence)
+    line = widgets.shortened(sentence, imgui.get_content_region_avail().x) if short else sentence
+    widgets.muted(line)
+    widgets.tooltip(sentence if line != sentence else "")

@@ -13,7 +13,8 @@ from langflash_core.lab.training.measures import (
 )
 from langflash_core.lab.training.shards import RoomRecord
 from langflash_core.language.answers import presence_scores
-from langflash_core.language.relevance import EMPTY_NORM, relevancy, rivalled
+from langflash_core.language.relevance import relevancy, rivalled
+from langflash_core.language.settings import RELEVANCE
 from langflash_core.language.spaces import encode_cached
 from langflash_core.language.vocabulary import OWN
 from langflash_core.types import Prediction
@@ -42,7 +43,7 @@ def ask_phrases(
     words = [_other_word(p, i) if varied and i % 2 else p for i, p in enumerate(asked)]
     vectors = setting.space.encode(words)
     mixed = torch.einsum("khw,kc->hwc", prediction.weights[0], prediction.dictionary)
-    features, norms = F.normalize(mixed, dim=-1), mixed.norm(dim=-1).clamp_min(EMPTY_NORM)
+    features, norms = F.normalize(mixed, dim=-1), mixed.norm(dim=-1).clamp_min(RELEVANCE.empty_norm)
     beaten = rivalled(prediction.dictionary, setting.space, words, vectors)
     added = torch.einsum("khw,kp->phw", prediction.weights[0], beaten) / norms
     positives = (torch.einsum("hwc,pc->phw", features, vectors) + added).clamp(-1, 1)

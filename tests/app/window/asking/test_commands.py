@@ -13,19 +13,13 @@ from app.window.asking.state import BINS, MOST_RECENT, Histogram, unfinished, us
 from app.window.scene import camera
 from app.window.scene import commands as show
 from app.window.scene.state import possible
-from app.window.scene.work import describe_scene
 from app.window.state import State
 from langflash_core.base import pictures
 from langflash_core.base.pictures import PICTURES, margin_span
 from langflash_core.errors import PromptError
 from langflash_core.language.algebra import terms
 from langflash_core.language.grammar import read
-from tests.app.window.scenes import after, room, shown_scene
-
-
-@pytest.fixture(scope="module")
-def info():
-    return describe_scene(room(torch.eye(3)), serial=1, name="room")
+from tests.app.window.scenes import after, shown_scene
 
 
 def asked(*texts: str) -> State:

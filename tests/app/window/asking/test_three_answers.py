@@ -9,21 +9,30 @@ import torch
 
 from app.window.asking import commands as ask
 from app.window.asking import things
+from app.window.asking.panels import prompts
 from app.window.asking.panels.known import KNOWS
 from app.window.asking.state import EVEN, Insight, Prompt
 from app.window.asking.work import Encode
 from app.window.editing.pointing import AtomsNamed
+from app.window.editing.work import NameAtoms
+from app.window.inventory.state import Row
+from app.window.kit import theme
 from app.window.scene.panels import tray
 from app.window.scene.state import Photo
+from app.window.scene.work import describe_scene
+from app.window.state import State
 from langflash_core.base.resources import asset_path
 from langflash_core.geometry.poses import Vector
 from langflash_core.language.answers import best_places
 from langflash_core.language.hints import reads_foreign
 from langflash_core.language.spaces import language_space
 from langflash_core.scene.edited import first_marks
-from langflash_core.scene.edits import History
+from langflash_core.scene.edits import History, delete
+from langflash_core.scene.mask import Mask
 from langflash_core.splat import render
 from langflash_core.types import Frame
+from tests.app.window.headless import context, frames, look
+from tests.app.window.rows import Rows
 from tests.app.window.scenes import PHRASES, after, room, shown_scene
 
 
@@ -82,7 +91,7 @@ def test_a_foreign_phrase_is_marked_with_its_compiled_question() -> None:
     encode = Encode(
         1, scene, (4, 7, 9), ("stuhl", "chair", "haus"), (), (b"", b"", bytes(4 * 383) + b"\0\0\x80?")
     )
-    (compiled,) = encode.run(lambda: False)
+    compiled, _ = encode.run(lambda: False)
     assert isinstance(compiled, ask.PhrasesCompiled) and [bool(note) for note in compiled.notes] == [
         True,
         False,
@@ -98,7 +107,7 @@ def test_chips_are_what_the_scene_shows_most_of_each_once() -> None:
     assert things.things(state) == ()
     black = (0.0, 0.0, 0.0)
     insight = Insight((0.2, 0.5, 0.001), (black, black, black), (0, 1, 2), np.eye(3))
-    names = AtomsNamed((("wall", "side"), ("Floor",), ("crumb",)))
+    names = AtomsNamed((("wall", "side"), ("Floor",), ("crumb",)), ("wall", "Floor", "crumb"))
     assert state.scene.info is not None
     history = History(first_marks(state.scene.info.scene))
     state = state.with_editing(history=history)
@@ -108,6 +117,62 @@ def test_chips_are_what_the_scene_shows_most_of_each_once() -> None:
     marks = replace(history.marks, atoms=silent)
     muted = state.with_editing(history=History(marks))
     assert things.things(muted) == ("wall",)
+    unanswered = after(state, replace(names, found=("wall",)))
+    assert things.things(unanswered) == ("wall",), "a chip that is asked is found"
+    row = Row(
+        "lamp 1", "lamp", 0.9, (0, 0, 0), (1, 1, 1), 0.0, (0,), False, Mask.first(4, 1), np.zeros((8, 3))
+    )
+    listed = unanswered.with_listing(rows=(row,))
+    assert things.things(listed) == ("wall", "lamp"), "what the inventory lists is a chip"
+    assert things.told(listed) == {"wall": 0}
+
+
+def test_names_of_groups_are_those_that_the_scene_answers() -> None:
+    """A group that is a little of everything is no thing that one finds, whatever word is nearest to it."""
+    scene = room(language_space("minilm").encode(list(PHRASES)))
+    info = describe_scene(scene, serial=1, name="room")
+    (named,) = NameAtoms(1, info.memory, first_marks(scene)).run(lambda: False)
+    assert isinstance(named, AtomsNamed) and named.found == tuple(row[0] for row in named.names)
+    own, floor = scene.semantics.weight_values, torch.full_like(scene.semantics.weight_ids, 2)
+    ids, values = torch.cat((scene.semantics.weight_ids, floor), 1), torch.cat((0.1 * own, 0.9 * own), 1)
+    faint = replace(scene, semantics=replace(scene.semantics, weight_ids=ids, weight_values=values))
+    memory = describe_scene(faint, serial=2, name="room").memory
+    (named,) = NameAtoms(2, memory, first_marks(faint)).run(lambda: False)
+    assert isinstance(named, AtomsNamed) and named.found == (named.names[2][0],)
+
+
+def test_a_phrase_that_is_not_found_names_the_photo_that_shows_it() -> None:
+    scene = room(language_space("minilm").encode(list(PHRASES)))
+    ids = (scene.semantics.weight_ids[:, 0] == 0).long()  # the second photo's are armchairs alone
+    owned = replace(scene, view_ids=ids)
+    marks = first_marks(owned)
+    encode = Encode(1, owned, (4, 7), ("armchair", "submarine"), (), marks=marks)
+    compiled, placed = encode.run(lambda: False)
+    assert placed == ask.PhrasesPlaced((4, 7), ("armchair", "submarine"), (1, None))
+    gone = delete(marks, Mask.of(ids.numpy() == 1))
+    *_, without = replace(encode, marks=gone).run(lambda: False)
+    assert isinstance(without, ask.PhrasesPlaced) and without.photos == (None, None)
+    prompts = Prompt(4, "armchair", photo=0), Prompt(7, "submarine now")
+    state = after(shown_scene().with_asking(prompts=prompts), compiled, placed)
+    assert [prompt.photo for prompt in state.asking.prompts] == [1, None]
+    typed = after(state, ask.EditPrompt(4, "armchairs"))
+    assert typed.asking.prompts[0].photo is None
+    assert after(typed, placed).asking.prompts[0].photo is None, "an answer to other words"
+
+
+def test_the_photo_that_shows_it_is_one_click_away(monkeypatch) -> None:
+    rows = Rows(monkeypatch)
+    state = shown_scene().with_asking(prompts=(Prompt(0, "door", score=0.1, photo=1),))
+
+    def shown(state: State) -> list[str]:
+        with context((500, 500)):
+            theme.set_up(1.0, "dark")
+            frames(lambda seen: prompts.draw(state, seen), look())
+        return [row.words for row in rows.now() if row.kind == "small_button"]
+
+    assert shown(state.with_scene(view=0)) == ["Photo 2 shows it"]
+    assert shown(state.with_scene(view=1)) == []
+    assert shown(state.with_asking(prompts=(Prompt(0, "door", score=0.9, photo=1),))) == []
 
 
 def test_a_chip_asks_its_word() -> None:

@@ -7,7 +7,6 @@ import numpy as np
 import pytest
 
 from app.window import commands as do
-from app.window.commands import apply
 from app.window.dialogs import Dialog
 from app.window.editing import cleaning as clean
 from app.window.editing import commands as edit
@@ -21,7 +20,7 @@ from langflash_core.language.spaces import language_space
 from langflash_core.mending.cleaning import cleaned
 from langflash_core.mending.recipes import Recipe, load_recipe, parsed_rule
 from langflash_core.scene.mask import Mask
-from tests.app.window.scenes import PHRASES, room
+from tests.app.window.scenes import PHRASES, after, room
 
 COUNT, BLOCK = 12_300, 2500
 RULES = (parsed_rule("depth>1.2,opacity<.95"), parsed_rule("colour~#808080:.2"), parsed_rule("photos<1"))
@@ -44,12 +43,6 @@ def info():
 @pytest.fixture
 def shown(info) -> State:
     return after(State(), show.SceneArrived(info), edit.FindFloaters())
-
-
-def after(state: State, *commands: do.Command) -> State:
-    for command in commands:
-        state = apply(state, command)
-    return state
 
 
 def worked(state: State) -> State:

@@ -5,42 +5,23 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import torch
 
 from app.window import commands as do
 from app.window.asking import commands as ask
 from app.window.asking.state import BINS, Histogram
-from app.window.commands import apply
 from app.window.editing import commands as edit
 from app.window.editing import pointing as point
 from app.window.editing.state import RADIUS_RANGE, Floaters, Reading, Region, Tool
 from app.window.frame.status import figures
 from app.window.scene import commands as show
 from app.window.scene.state import FLIGHT_SECONDS, Job
-from app.window.scene.work import describe_scene
 from app.window.state import State
 from langflash_core.base import pictures
 from langflash_core.scene.edited import edited_scene
 from langflash_core.scene.edits import Combine, Mask
-from tests.app.window.scenes import CHAIR, room
+from tests.app.window.scenes import CHAIR, after
 
 CHAIRS = 2500  # the first rows of the room are its block
-
-
-def after(state: State, *commands: do.Command) -> State:
-    for command in commands:
-        state = apply(state, command)
-    return state
-
-
-@pytest.fixture(scope="module")
-def info():
-    return describe_scene(room(torch.eye(3)), serial=1, name="room")
-
-
-@pytest.fixture
-def shown(info) -> State:
-    return after(State(), show.SceneArrived(info))
 
 
 def rows(first: int, last: int, count: int = 12_300) -> Mask:

@@ -30,7 +30,7 @@ from app.window.state import State
 from langflash_core.errors import InputError
 from langflash_core.mending.hiding import preview
 from langflash_core.mending.looks import drawn
-from langflash_core.mending.recipes import MARGIN, MOST_MARGIN
+from langflash_core.mending.settings import RECIPE_DEFAULTS
 from langflash_core.scene.changes import Moved
 from langflash_core.scene.file import load, save
 from langflash_core.scene.mask import Mask
@@ -149,7 +149,7 @@ def test_what_is_hidden_is_another_scene_until_then_undone_at_once(desk: Desk, h
     before = desk.state.scene.info
     desk.perform(mending.AskToHide(how))
     assert desk.state.editing.hiding is not None and desk.state.editing.hiding.how == how
-    desk.perform(mending.HideForGood(how, MARGIN))
+    desk.perform(mending.HideForGood(how, RECIPE_DEFAULTS.margin))
     desk.work()
     scene = desk.state.scene
     assert (
@@ -172,13 +172,15 @@ def test_the_margin_is_seen_before_and_hidden_as_it_was_seen(desk: Desk) -> None
     assert info is not None and marks is not None
     desk.perform(mending.AskToHide("blur"))
     asked = desk.state.editing.hiding
-    assert asked is not None and asked.margin == MARGIN and asked.mask(marks) is None
+    assert asked is not None and asked.margin == RECIPE_DEFAULTS.margin and asked.mask(marks) is None
     desk.work()
     counts = []
-    for margin in (0.0, MARGIN, 0.1, 7.0):
+    for margin in (0.0, RECIPE_DEFAULTS.margin, 0.1, 7.0):
         desk.perform(mending.SetMargin(margin), mending.AskToHide("pixels"))
         asked = desk.state.editing.hiding
-        assert asked is not None and asked.margin == min(margin, MOST_MARGIN) and not desk.asked
+        assert (
+            asked is not None and asked.margin == min(margin, RECIPE_DEFAULTS.most_margin) and not desk.asked
+        )
         found = asked.mask(marks)
         assert found is not None and not marks.selected - found
         counts.append(len(found))
@@ -209,7 +211,7 @@ def test_the_margin_is_looked_for_again_where_the_selection_is_another(desk: Des
 def test_once_saved_nothing_on_the_disk_brings_it_back(desk: Desk, tmp_path: Path) -> None:
     secret = [row.tobytes() for row in room(torch.eye(3)).gaussians.means[:BLOCK:50].numpy()]
     assert any(each in content for content in kept_of(state_folder()) for each in secret)
-    desk.perform(mending.HideForGood("blur", MARGIN))
+    desk.perform(mending.HideForGood("blur", RECIPE_DEFAULTS.margin))
     desk.work()
     desk.rest()
     assert not any(each in content for content in kept_of(state_folder()) for each in secret)
@@ -254,11 +256,11 @@ def hidden_again(desk: Desk) -> None:
     marks = desk.state.editing.marks
     assert marks is not None
     desk.perform(edit.Found(Mask.first(marks.deleted.count, 300), "replace", "more"))
-    desk.perform(mending.HideForGood("blur", MARGIN))
+    desk.perform(mending.HideForGood("blur", RECIPE_DEFAULTS.margin))
     desk.work(8)
     desk.perform(mending.BringBack())
     assert desk.state.scene.unhidden is None and desk.state.editing.num_selected == 300
-    desk.perform(mending.HideForGood("blur", MARGIN))
+    desk.perform(mending.HideForGood("blur", RECIPE_DEFAULTS.margin))
     desk.work(9)
 
 
@@ -275,7 +277,7 @@ def test_whatever_follows_nothing_that_the_program_kept_shows_it_once_it_is_save
     desk.work()
     save(info.scene, state_folder() / f"session-1-dead{EDITED}")
     assert shows(state_folder()) == 5
-    desk.perform(mending.HideForGood("blur", MARGIN))
+    desk.perform(mending.HideForGood("blur", RECIPE_DEFAULTS.margin))
     desk.work()
     then(desk)
     desk.perform(show.SaveScene(tmp_path / "room.langflash"))
@@ -288,7 +290,7 @@ def test_whatever_follows_nothing_that_the_program_kept_shows_it_once_it_is_save
 
 
 def test_what_was_edited_meanwhile_is_not_lost(desk: Desk) -> None:
-    desk.perform(mending.HideForGood("blur", MARGIN))
+    desk.perform(mending.HideForGood("blur", RECIPE_DEFAULTS.margin))
     desk.perform(edit.Delete())
     desk.work()
     assert desk.state.scene.info is not None and desk.state.scene.info.serial == 1
@@ -298,7 +300,9 @@ def test_what_was_edited_meanwhile_is_not_lost(desk: Desk) -> None:
 def test_without_a_selection_nothing_happens(desk: Desk) -> None:
     desk.perform(edit.Deselect())
     before = desk.state
-    desk.perform(mending.AskToHide(), mending.HideForGood("blur", MARGIN), mending.FillSelection())
+    desk.perform(
+        mending.AskToHide(), mending.HideForGood("blur", RECIPE_DEFAULTS.margin), mending.FillSelection()
+    )
     assert desk.state == before and not desk.asked
 
 

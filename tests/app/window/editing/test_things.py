@@ -5,7 +5,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-import torch
 
 from app.window.editing import commands as edit
 from app.window.editing import mending, work
@@ -16,19 +15,13 @@ from app.window.editing.things import Outlined, SetLevel, StepLevel, ThingFound
 from app.window.effects import Hands
 from app.window.frame import table
 from app.window.scene import commands as show
-from app.window.scene.work import describe_scene
 from app.window.state import State
 from langflash_core.scene.mask import Mask
 from tests.app.window.editing.test_mending import BLOCK, Desk, desk
-from tests.app.window.scenes import after, room
+from tests.app.window.scenes import after
 
 __all__ = ["desk"]  # a fixture
 LEVELS = tuple(Mask.first(12_300, count) for count in (100, BLOCK, 5000))
-
-
-@pytest.fixture(scope="module")
-def info():
-    return describe_scene(room(torch.eye(3)), serial=1, name="room")
 
 
 @pytest.fixture

@@ -17,13 +17,14 @@ from app.window.opening import effects, work
 from app.window.opening.panels import strip as panel
 from app.window.opening.state import Film, told_film
 from app.window.scene import commands as show
-from app.window.scene.drops import FILM_PHOTOS, MAX_PHOTOS, sort_drop
+from app.window.scene.drops import sort_drop
 from app.window.scene.effects import SceneEffects
 from app.window.scene.panels import tray
 from app.window.scene.state import Job
 from app.window.scene.work import ReconstructPhotos
 from app.window.state import State
 from langflash_core.errors import Cancelled, FilmError
+from langflash_core.images.settings import PHOTO_LIMITS
 from tests import films
 from tests.app.window import headless
 from tests.app.window.scenes import shown_scene
@@ -89,7 +90,7 @@ def desk(walk: Path) -> Desk:
 
 def test_a_dropped_film_shows_its_strip(desk: Desk, walk: Path) -> None:
     assert desk.state.dialog is Dialog.FILM and desk.state.scene.job is None and desk.film.path == walk
-    assert 10 < len(desk.film.chosen) <= FILM_PHOTOS and desk.state.scene.photos == ()
+    assert 10 < len(desk.film.chosen) <= PHOTO_LIMITS.film_photos and desk.state.scene.photos == ()
     pictures = [command for command in desk.performed if isinstance(command, ShowPicture)]
     assert len(pictures) == len(desk.film.strip.stills)
     assert "Of 40 frames" in panel.told(desk.film) and "lay between them" in panel.told(desk.film)
@@ -114,7 +115,7 @@ def test_frames_are_put_in_and_taken_out(desk: Desk) -> None:
     assert len(desk.film.chosen) == 5
     desk.perform(opening.ProposeFrames(6, exactly=True))
     assert len(desk.film.chosen) == 6
-    desk.perform(opening.ProposeFrames(FILM_PHOTOS))
+    desk.perform(opening.ProposeFrames(PHOTO_LIMITS.film_photos))
     assert desk.film.chosen == (first, *others)
     assert not desk.asked, "nothing is decoded or read for that"
 
@@ -132,7 +133,7 @@ def test_the_chosen_frames_become_a_scene(desk: Desk) -> None:
 
 
 def test_beside_photos_and_beside_a_scene(walk: Path, tmp_path: Path) -> None:
-    photos = tuple(tmp_path / f"{number}.jpg" for number in range(MAX_PHOTOS - 3))
+    photos = tuple(tmp_path / f"{number}.jpg" for number in range(PHOTO_LIMITS.max_photos - 3))
     desk = Desk()
     desk.perform(show.AddPhotos(photos))
     desk.asked.clear()
@@ -143,7 +144,10 @@ def test_beside_photos_and_beside_a_scene(walk: Path, tmp_path: Path) -> None:
     desk.perform(opening.SwitchFrame(left))
     assert len(desk.film.chosen) == 3 and "At most 3 frames" in desk.state.toasts[-1].text
     desk.perform(opening.TakeFrames())
-    assert len(desk.state.scene.photos) == MAX_PHOTOS and desk.state.scene.photos[0].path == photos[0]
+    assert (
+        len(desk.state.scene.photos) == PHOTO_LIMITS.max_photos
+        and desk.state.scene.photos[0].path == photos[0]
+    )
 
     desk = Desk(shown_scene())
     desk.perform(show.OpenPaths((str(walk),), dropped=True))
@@ -249,7 +253,7 @@ def test_a_blurred_frame_that_is_taken_in_was_blurred(desk: Desk) -> None:
         for index, still in enumerate(desk.film.strip.stills)
     )
     strip = replace(desk.film.strip, stills=stills)
-    film = opening.proposed(desk.film.path, strip, FILM_PHOTOS)
+    film = opening.proposed(desk.film.path, strip, PHOTO_LIMITS.film_photos)
     assert 3 not in film.chosen
     by_hand = replace(film, chosen=tuple(sorted({*film.chosen, 3})))
     assert by_hand.left_out["blurred"] == film.left_out["blurred"] - 1

@@ -4,19 +4,15 @@ from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
 
-import pytest
-import torch
-
 from app.window.asking import commands as ask
 from app.window.recovery import commands as keep
 from app.window.recovery.preferences import PANEL_WIDTHS
 from app.window.recovery.state import Kept, Offer
 from app.window.scene import commands as show
-from app.window.scene.work import describe_scene
 from app.window.state import State
 from langflash_core.base import pictures
 from langflash_core.geometry.poses import Pose, Vector
-from tests.app.window.scenes import after, room
+from tests.app.window.scenes import after
 from tests.app.window.scenes import shown_scene as scene
 
 
@@ -54,16 +50,6 @@ def test_a_restored_session_has_its_photos_phrases_camera_and_mode() -> None:
     )
     turned_down = after(State(), keep.OfferSession(kept), keep.EndSessionOffer(restore=False))
     assert turned_down == State()
-
-
-@pytest.fixture(scope="module")
-def info():
-    return describe_scene(room(torch.eye(3)), serial=1, name="room")
-
-
-@pytest.fixture
-def shown(info) -> State:
-    return after(State(), show.SceneArrived(info))
 
 
 def test_offers_end(shown: State) -> None:

@@ -20,12 +20,11 @@ from app.window.recovery.effects import KEEP_AFTER
 from app.window.recovery.preferences import DEFAULTS
 from app.window.scene import commands as show
 from app.window.scene import work as scene_work
-from app.window.scene.work import JoinScenes, LoadScene, describe_scene
+from app.window.scene.work import JoinScenes, LoadScene
 from app.window.state import State
 from langflash_core.scene.edits import Mask, delete
 from langflash_core.scene.file import save
 from tests.app.window.recovery.desk import Desk
-from tests.app.window.scenes import room
 
 
 @pytest.fixture
@@ -33,11 +32,6 @@ def desk(folders: Path) -> Iterator[Desk]:
     desk = Desk()
     yield desk
     desk.effects.close(desk.state, crashed=False)
-
-
-@pytest.fixture(scope="module")
-def info():
-    return describe_scene(room(torch.eye(3)), serial=1, name="room")
 
 
 def some(count: int = 12_300) -> Mask:

@@ -5,42 +5,30 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import torch
 
 from app.window import commands as do
 from app.window.asking.commands import EditPrompt
 from app.window.effects import Hands
 from app.window.scene import camera, work
 from app.window.scene import commands as show
-from app.window.scene.drops import MAX_PHOTOS
 from app.window.scene.effects import SceneEffects
 from app.window.scene.state import FLIGHT_SECONDS
-from app.window.scene.work import describe_scene
 from app.window.state import State
 from langflash_core.geometry.poses import Pose
+from langflash_core.images.settings import PHOTO_LIMITS
 from langflash_core.scene.file import save
-from tests.app.window.scenes import after, room, told
+from tests.app.window.scenes import after, told
 from tests.app.window.scenes import shown_scene as scene
 
 PATHS = tuple(Path(f"/photos/{name}.jpg") for name in "abc")
 
 
-@pytest.fixture(scope="module")
-def info():
-    return describe_scene(room(torch.eye(3)), serial=1, name="room")
-
-
-@pytest.fixture
-def shown(info) -> State:
-    return after(State(), show.SceneArrived(info))
-
-
 def test_photos_are_added_once_and_bounded() -> None:
-    paths = tuple(Path(f"{i}.jpg") for i in range(MAX_PHOTOS + 3))
+    paths = tuple(Path(f"{i}.jpg") for i in range(PHOTO_LIMITS.max_photos + 3))
     state = after(State(), show.AddPhotos(paths[:2]), show.AddPhotos(paths[1:3]))
     assert [p.path.name for p in state.scene.photos] == ["0.jpg", "1.jpg", "2.jpg"]
     state = after(state, show.AddPhotos(paths))
-    assert len(state.scene.photos) == MAX_PHOTOS
+    assert len(state.scene.photos) == PHOTO_LIMITS.max_photos
     assert "3 photos were left out" in state.toasts[0].text
     state = after(state, show.RemovePhoto(0))
     assert state.scene.photos[0].path.name == "1.jpg"

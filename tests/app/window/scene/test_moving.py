@@ -275,6 +275,24 @@ def test_elsewhere_it_orbits_and_with_alt_everywhere(
     assert math.dist(around.centre, state.scene.pose.centre) > 0.02
 
 
+def test_around_a_pivot_a_hand_turns_no_faster_than_on_the_spot(
+    state: State, away: State, drag: Callable[..., State]
+) -> None:
+    """Sixty pixels went 18 degrees around, beside all that photos saw, where they look 3 on the spot."""
+
+    def turned(before: State, across: int) -> float:
+        found = drag(before, across, 0).scene.pose
+        return math.acos((float(np.trace(before.scene.pose.axes.T @ found.axes)) - 1) / 2)
+
+    pixel = 1 / poses.intrinsics(away.scene.pose, *SIZE)[0, 0]
+    # Between two photos little is held back; the first of the frames moves nothing.
+    assert 0.8 * 60 * pixel < turned(away, 60) < 60 * pixel * (1 + EXACT)
+    assert away.scene.info is not None
+    alone = away.with_scene(info=replace(away.scene.info, views=()))
+    free = replace(alone, preferences=replace(alone.preferences, near_photos=False))
+    assert turned(free, 60) == pytest.approx(60 * moving.TURN), "a thing without photos is turned at once"
+
+
 def test_a_drag_that_goes_on_gets_into_the_dark(state: State, drag: Callable[..., State]) -> None:
     around = near.surroundings(state)
     assert around is not None

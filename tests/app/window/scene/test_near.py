@@ -13,7 +13,7 @@ from langflash_core.geometry import poses
 from langflash_core.scene.edited import first_marks
 from langflash_core.scene.edits import History
 from langflash_core.scene.mask import Mask
-from langflash_core.scene.trust import FULL
+from langflash_core.scene.settings import TRUST
 from tests.app.window.scenes import VIEWS, shown_scene
 
 
@@ -31,7 +31,7 @@ def state() -> State:
 
 
 def test_how_far_the_photos_are_is_told_where_the_picture_fades(state: State) -> None:
-    assert FADING == FULL  # said twice, because the window starts before torch is there
+    assert TRUST.full == FADING  # said twice, because the window starts before torch is there
     assert places_to_keep_to(state) == tuple(view.centre for view in VIEWS)
     assert degrees_from_photos(state) == pytest.approx(40)
     assert any("40° away" in text for text in figures(state))

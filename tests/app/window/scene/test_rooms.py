@@ -5,7 +5,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-import torch
 
 from app.window import commands as do
 from app.window.dialogs import Dialog
@@ -14,14 +13,13 @@ from app.window.effects import Hands
 from app.window.scene import commands as show
 from app.window.scene import work
 from app.window.scene.effects import SceneEffects
-from app.window.scene.state import MOST_ROOMS, Photo, SceneInfo
-from app.window.scene.work import describe_scene
+from app.window.scene.state import MOST_ROOMS, Photo
 from app.window.state import State
 from langflash_core import pipeline
 from langflash_core.errors import ImageError
 from langflash_core.scene.edits import Mask
 from langflash_core.scene.file import save
-from tests.app.window.scenes import after, room, shown_scene
+from tests.app.window.scenes import after, shown_scene
 
 PHOTOS = (Path("/p/a.jpg"), Path("/p/b.jpg"))
 SOME = Mask.of(np.arange(12_300) < 5)
@@ -56,11 +54,6 @@ class Desk:
     @property
     def jobs(self) -> list[str]:
         return [type(each).__name__ for each in self.asked if isinstance(each, work.Job)]
-
-
-@pytest.fixture(scope="module")
-def info() -> SceneInfo:
-    return describe_scene(room(torch.eye(3)), serial=1, name="room")
 
 
 @pytest.fixture
