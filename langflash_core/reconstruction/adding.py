@@ -112,10 +112,9 @@ def _check(scene: Scene, count: int) -> None:
         raise InputError(
             "this scene keeps no layer and picture of each photo; reconstruct it again with all photos"
         )
-    if scene.num_views + count > PHOTO_LIMITS.max_photos:
-        raise InputError(
-            f"{scene.num_views + count} photos are too many; a scene has at most {PHOTO_LIMITS.max_photos} of them"
-        )
+    whole, most = scene.num_views + count, PHOTO_LIMITS.max_photos
+    if whole > most:
+        raise InputError(f"{whole} photos are too many; a scene has at most {most} of them")
 
 
 @dataclass(frozen=True)

@@ -5,15 +5,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import torch
 
 from app.window import commands as do
 from app.window.dialogs import Dialog
 from app.window.editing import commands as edit
 from app.window.effects import Hands
 from app.window.scene import commands as show
-from app.window.scene import work
+from app.window.scene import merging, work
 from app.window.scene.effects import SceneEffects
-from app.window.scene.state import MOST_ROOMS, Photo
+from app.window.scene.state import MOST_ROOMS, Photo, SceneInfo
+from app.window.scene.work import describe_scene
 from app.window.state import State
 from langflash_core import pipeline
 from langflash_core.errors import ImageError
@@ -238,3 +240,40 @@ def test_who_cancels_quitting_may_save_and_stay(desk: Desk, tmp_path: Path) -> N
     desk.perform(do.Leave(), show.SaveFirst(), do.ShowDialog(None), do.ShowDialog(Dialog.SAVE))
     desk.perform(show.SaveScene(place), show.SceneSaved(place))
     assert not desk.state.leaving and desk.state.scene.pending == ()
+
+
+@pytest.fixture
+def layered(info: SceneInfo) -> SceneInfo:
+    """The room as two layers, which keeps its photos."""
+    scene = replace(info.scene, photos=(b"a",) * info.scene.num_views)
+    ids = torch.arange(len(scene.gaussians)) % scene.num_views
+    return describe_scene(replace(scene, view_ids=ids).with_record(layered=True), 3, "room")
+
+
+def test_a_photo_dropped_on_a_room_of_layers_makes_a_room_with_it_of_what_is_on_show(
+    layered: SceneInfo, photo: Path, monkeypatch
+) -> None:
+    desk, given = Desk(), []
+
+    def add_photos(scene, photos, **_):
+        given.append((len(scene.gaussians), photos))
+        return scene
+
+    monkeypatch.setattr(pipeline, "add_photos", add_photos)
+    desk.perform(show.SceneArrived(layered), edit.Found(SOME, "replace", "here"), edit.Delete())
+    assert merging.can_grow(desk.state, 1)
+    desk.perform(merging.AddToScene((photo,)))
+    assert desk.state.scene.job is not None and desk.state.scene.job.title == "Adding c.jpg"
+    request = desk.asked[-1]
+    assert isinstance(request, work.PutInPhotos)
+    desk.perform(request.run(4, lambda *_: None, lambda: False))
+    assert given == [(layered.num_gaussians - 5, (photo,))]
+    state = desk.state
+    assert state.scene.info is not None and (state.scene.info.serial, state.scene.info.name) == (4, "room")
+    assert [each.info.serial for each in state.scene.rooms] == [3] and state.scene.job is None
+
+
+def test_a_room_without_layers_is_made_anew_instead(desk: Desk, layered: SceneInfo) -> None:
+    assert not merging.can_grow(desk.state, 1)
+    desk.perform(show.SceneArrived(layered))
+    assert not merging.can_grow(desk.state, layered.scene.num_views)  # most would be new
