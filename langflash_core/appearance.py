@@ -77,7 +77,7 @@ def own_network() -> LangFlashNet:
     return load_network(PRESET)
 
 
-def taken(scene: Scene, lessons: Lessons, network: LangFlashNet | None = None) -> dict[int, Lesson]:
+def lessons_taken(scene: Scene, lessons: Lessons, network: LangFlashNet | None = None) -> dict[int, Lesson]:
     """What the groups of a scene take of a vocabulary, by atom; what was taught in it goes before.
 
     Raises:

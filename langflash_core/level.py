@@ -30,7 +30,7 @@ from langflash_core.language.relevance import compile_query
 from langflash_core.language.spaces import language_space
 from langflash_core.scene.standing import normals_of
 from langflash_core.scene.thin import covered_areas
-from langflash_core.scene.world import placed, turn_of
+from langflash_core.scene.world import transform_scene, turn_of
 from langflash_core.splat import render
 from langflash_core.types import NO_LANGUAGE, Camera, Scene
 
@@ -155,13 +155,13 @@ def found_world(
 
     w, x, y, z = Rotation.from_matrix(axes).as_quat(scalar_first=True).tolist()
     world = World((w, x, y, z), tuple(place.tolist()), up_by, error, floor_by, north_by)
-    return replace(world, guess=guessed(evidence(scene, world, surface)))
+    return replace(world, guess=guess_scale(evidence(scene, world, surface)))
 
 
 NOT_SURE = "the photos do not clearly show which way is up; langflash level, or the window, guesses it"
 
 
-def levelled(scene: Scene) -> Scene:
+def level_scene(scene: Scene) -> Scene:
     """The scene with where it stands in its record, where that is sure, and else with a warning; its tensors
     are the same."""
     try:
@@ -195,7 +195,7 @@ def upright(scene: Scene) -> Scene:
     if guess is not None:
         guess = Guess(guess.metres / metres, guess.low / metres, guess.high / metres, guess.by)
     stands = replace(world, turn=(1.0, 0.0, 0.0, 0.0), origin=(0.0, 0.0, 0.0), guess=guess)
-    moved = placed(scene, turn_of(world), np.array(world.origin), metres)
+    moved = transform_scene(scene, turn_of(world), np.array(world.origin), metres)
     known = 1.0 if scene.record.metric_scale else None
     return moved.with_record(world=stands, metric_scale=known, network_unit=unit)
 
@@ -366,7 +366,7 @@ def evidence(scene: Scene, world: World, surface: Surface) -> list[Evidence]:
     return found
 
 
-def guessed(found: Sequence[Evidence]) -> Guess | None:
+def guess_scale(found: Sequence[Evidence]) -> Guess | None:
     """The mean of the logarithm of metres per unit, and its deviation, by all evidence at once; None of
     nothing.
 
@@ -464,7 +464,7 @@ def _vector(name: str, values: Sequence[float]) -> np.ndarray:
 # Told lengths
 
 
-def measured(scene: Scene, a: Sequence[float], b: Sequence[float], metres: float) -> Scene:
+def apply_measurement(scene: Scene, a: Sequence[float], b: Sequence[float], metres: float) -> Scene:
     """The scene in the unit in which two of its points are so many metres apart.
 
     Raises:

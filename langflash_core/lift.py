@@ -35,7 +35,7 @@ from langflash_core.network.posed import posed_semantics
 from langflash_core.scene.lookouts import lookouts
 from langflash_core.scene.weights import sparse_weights
 from langflash_core.splat import render as render_reference
-from langflash_core.splat.backprojection import gathered
+from langflash_core.splat.backprojection import backproject
 from langflash_core.splat.compose import shares
 from langflash_core.types import Camera, Frame, Scene, Semantics, Views
 
@@ -114,14 +114,14 @@ def lift(
     told, see = _Telling(progress, cancelled), partial(posed_semantics, network)
     if photos is not None and viewmats is not None:
         cameras = [Camera(v, K, *photos.size) for v, K in zip(viewmats, photos.Ks, strict=True)]
-        looked = _looked(scene, cameras, photos, draw, see, told)
-        lifted = _spoken(scene, looked, network.calibration)
+        looked = _look_at_views(scene, cameras, photos, draw, see, told)
+        lifted = _add_language(scene, looked, network.calibration)
         told("done", 1.0)
         doubt = _doubt(looked.frames, photos)
         return lifted.with_record(warnings=(*lifted.record.warnings, doubt)) if doubt else lifted
-    looked = _looked(scene, own_cameras(scene, LIFTING.views, up), None, draw, see, told)
+    looked = _look_at_views(scene, own_cameras(scene, LIFTING.views, up), None, draw, see, told)
     told("done", 1.0)
-    return _with_hint(_spoken(scene, looked, network.calibration), up)
+    return _with_hint(_add_language(scene, looked, network.calibration), up)
 
 
 @dataclass(frozen=True)
@@ -153,7 +153,7 @@ class _Looked:
         return self.sums / self.totals.clamp_min(1e-12)[:, None]
 
 
-def _looked(
+def _look_at_views(
     scene: Scene,
     cameras: Sequence[Camera],
     photos: Views | None,
@@ -278,8 +278,8 @@ def likeness(frame: Frame, photo: Float[Tensor, "3 H W"]) -> float:
     """
     weights = torch.tensor((0.299, 0.587, 0.114), dtype=torch.float32)
     drawn = frame.rgb.float().cpu() / frame.alphas.float().cpu().clamp_min(LIFTING.covered)[..., None]
-    greys = _blurred(torch.stack((drawn @ weights, photo.float().cpu().permute(1, 2, 0) @ weights)))
-    covered = _blurred((frame.alphas.cpu() >= LIFTING.covered).float()[None])[0, 1:, 1:] > 1 - 1e-3
+    greys = _blur(torch.stack((drawn @ weights, photo.float().cpu().permute(1, 2, 0) @ weights)))
+    covered = _blur((frame.alphas.cpu() >= LIFTING.covered).float()[None])[0, 1:, 1:] > 1 - 1e-3
     if float(covered.float().mean()) < LIFTING.fewest_shown:
         return math.nan
     across, down = greys[:, 1:, 1:] - greys[:, 1:, :-1], greys[:, 1:, 1:] - greys[:, :-1, 1:]
@@ -290,7 +290,7 @@ def likeness(frame: Frame, photo: Float[Tensor, "3 H W"]) -> float:
     return float(gradients.prod(0).sum(-1).mean() / sizes.prod())
 
 
-def _blurred(pictures: Float[Tensor, "n H W"]) -> Float[Tensor, "n H W"]:
+def _blur(pictures: Float[Tensor, "n H W"]) -> Float[Tensor, "n H W"]:
     """By `LIFTING.blur` pixels, twice, which forgives poses a few pixels."""
     for _ in range(2):
         pictures = torch.nn.functional.avg_pool2d(
@@ -327,15 +327,15 @@ def _carried_back(
     for index, (camera, values, frame) in enumerate(zip(cameras, maps, frames, strict=True)):
         told("carrying back", 0.6 + 0.4 * index / len(cameras))
         trust = (frame.alphas >= LIFTING.covered).float()
-        for rows, counts in _pictured(scene, camera, draw):
+        for rows, counts in _contributions(scene, camera, draw):
             some = scene.gaussians.rows(rows)
-            own, count = gathered(some, camera, values.permute(1, 2, 0), trust * counts)
+            own, count = backproject(some, camera, values.permute(1, 2, 0), trust * counts)
             sums[rows] += own
             totals[rows] += count
     return sums, totals
 
 
-def _pictured(scene: Scene, camera: Camera, draw: Renderer) -> list[tuple[Tensor, Tensor]]:
+def _contributions(scene: Scene, camera: Camera, draw: Renderer) -> list[tuple[Tensor, Tensor]]:
     """Rows (n,) of what makes up a picture, and what it counts in each pixel (H, W): all of the scene, or
     each of the layers that are blended."""
     chosen = Nearness.of(scene).chosen(camera) if scene.layered else None
@@ -349,7 +349,7 @@ def _pictured(scene: Scene, camera: Camera, draw: Renderer) -> list[tuple[Tensor
     return list(zip(rows, shares(alphas.cpu(), depths.cpu(), chosen.weights), strict=True))
 
 
-def _spoken(scene: Scene, looked: _Looked, calibration: dict) -> Scene:
+def _add_language(scene: Scene, looked: _Looked, calibration: dict) -> Scene:
     """The scene with its language.
 
     Raises:

@@ -14,7 +14,7 @@ from langflash_core.base.detail import DEFAULT_DETAIL
 from langflash_core.base.resources import asset_path
 from langflash_core.base.running import Progress, Run
 from langflash_core.errors import InputError, ViewError
-from langflash_core.export import opened
+from langflash_core.export import open_scene
 from langflash_core.images.decode import grey_photo
 from langflash_core.images.lens import Intrinsics
 from langflash_core.language.answers import answer
@@ -151,7 +151,7 @@ def add_photos(
     from langflash_core.images.pictures import photo_paths
     from langflash_core.reconstruction.adding import scene_with
 
-    scene = opened(scene)
+    scene = open_scene(scene)
 
     def make(files: Sequence[Path], fields: Sequence[float], poses: Tensor) -> Scene:
         return reconstruct(
@@ -197,7 +197,7 @@ def query(
         WeightsError: the language space has no text weights.
         SceneFileError: the path holds no scene. InputError: neither a scene nor a path was given.
     """
-    scene = opened(scene)
+    scene = open_scene(scene)
     chosen = seen_from(scene, view, camera, size)
     phrases = [prompts] if isinstance(prompts, str) else list(prompts)
     space = language_space(scene.semantics.space)
@@ -231,7 +231,7 @@ def select(
     """
     from langflash_core.meant import answering
 
-    scene, prompts = opened(scene), [prompts] if isinstance(prompts, str) else prompts
+    scene, prompts = open_scene(scene), [prompts] if isinstance(prompts, str) else prompts
     return scene.rows(torch.from_numpy(answering(scene, prompts, threshold)))
 
 
@@ -385,4 +385,4 @@ def seen_from(scene: Scene, view: int, camera: Camera | None, size: tuple[int, i
         if not 0 <= view < scene.num_views:
             raise ViewError(f"there is no view {view}; the scene has views 0 to {scene.num_views - 1}")
         camera = scene.camera(view)
-    return lit_camera(scene, camera if size is None else camera.resized(*size))
+    return lit_camera(scene, camera if size is None else camera.with_size(*size))

@@ -16,7 +16,7 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from langflash_core.export import opened
+from langflash_core.export import open_scene
 from langflash_core.geometry.fusion import ColouredView, Surface, fuse
 from langflash_core.geometry.harmonics import SH_C0
 from langflash_core.language.answers import oriented_box
@@ -50,7 +50,7 @@ def segment(
     Raises:
         PromptError: a prompt or the threshold cannot be used. WeightsError: the space has no text weights.
     """
-    scene, prompts = opened(scene), [prompts] if isinstance(prompts, str) else prompts
+    scene, prompts = open_scene(scene), [prompts] if isinstance(prompts, str) else prompts
     compiled = compile_spoken(scene, language_space(scene.semantics.space), list(prompts))
     limit = compiled.threshold if threshold is None else threshold
     check_threshold(limit)
@@ -170,12 +170,12 @@ def cut_out(scene: Scene, members: Tensor, camera: Camera, matte: Tensor, render
     Returns:
         (H, W, 4) in [0, 1]; colour is 0 where the matte is.
     """
-    rgb = render(_blackened(scene, ~members), camera, weight_maps=False).rgb
+    rgb = render(_blacken(scene, ~members), camera, weight_maps=False).rgb
     colour = torch.where((matte >= _LEAST)[..., None], rgb / matte.clamp_min(_LEAST)[..., None], 0.0)
     return torch.cat((colour, matte[..., None]), -1).clamp(0, 1)
 
 
-def _blackened(scene: Scene, rows: Tensor) -> Scene:
+def _blacken(scene: Scene, rows: Tensor) -> Scene:
     """The scene with some Gaussians black from everywhere: colour is 0.5 + SH_C0 sh_0, clamped at 0."""
     sh = torch.where(rows.to(scene.gaussians.sh.device)[:, None, None], 0.0, scene.gaussians.sh)
     sh[rows, 0] = -1 / SH_C0

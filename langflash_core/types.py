@@ -79,7 +79,7 @@ class Camera:
     orthographic: bool = False
     light: Float[Tensor, "2 3"] | None = None
 
-    def resized(self, width: int, height: int) -> "Camera":
+    def with_size(self, width: int, height: int) -> "Camera":
         """The same camera drawn at another size; the field of view is kept per axis."""
         ratio = torch.tensor([width / self.width, height / self.height, 1.0]).to(self.K)
         return replace(self, K=self.K * ratio[:, None], width=width, height=height)
@@ -379,7 +379,7 @@ class Scene:
     def camera(self, view: int, width: int | None = None, height: int | None = None) -> Camera:
         """Camera of input view `view` (from 0), optionally drawn at another size."""
         own = Camera(self.viewmats[view], self.Ks[view], *self.view_size)
-        return own if width is None or height is None else own.resized(width, height)
+        return own if width is None or height is None else own.with_size(width, height)
 
     def show(self, prompts: Sequence[str] | str = (), **options: Any) -> Any:
         """The scene in a cell of a notebook, as `showing.notebook.show` has it."""
@@ -405,9 +405,9 @@ class Scene:
             self,
             gaussians=self.gaussians.rows(keep),
             semantics=self.semantics.rows(keep),
-            view_ids=_picked(self.view_ids, keep),
-            levels=_picked(self.levels, keep),
-            confidences=_picked(self.confidences, keep),
+            view_ids=_select_rows(self.view_ids, keep),
+            levels=_select_rows(self.levels, keep),
+            confidences=_select_rows(self.confidences, keep),
         )
 
     def with_record(self, **changes) -> "Scene":
@@ -483,8 +483,8 @@ class QueryResult:
         return (
             f"QueryResult: {len(told[True])} of {len(self.answers)} phrases found in a view of "
             f"{self.camera.width} x {self.camera.height} pixels, by {self.mode}\n"
-            f"  found: {_listed(told[True])}\n"
-            f"  not found: {_listed(told[False])}"
+            f"  found: {_list_names(told[True])}\n"
+            f"  not found: {_list_names(told[False])}"
         )
 
 
@@ -553,7 +553,7 @@ class SegmentedView:
         return torch.where(best > 0, which + 1, 0)
 
 
-def _listed(names: Sequence[str], most: int = 6) -> str:
+def _list_names(names: Sequence[str], most: int = 6) -> str:
     """The first of some names in a row, and how many more there are; "-": none."""
     more = [f"{len(names) - most} more"] if len(names) > most else []
     return ", ".join([*names[:most], *more]) or "-"
@@ -564,7 +564,7 @@ def _shape(name: str, values: Tensor, expected: tuple[int, ...]) -> None:
         raise ValueError(f"{name}: expected shape {expected}, received {tuple(values.shape)}")
 
 
-def _picked(values: Tensor | None, keep: Tensor) -> Tensor | None:
+def _select_rows(values: Tensor | None, keep: Tensor) -> Tensor | None:
     """Some rows of what may not be known."""
     return None if values is None else values[keep.to(values.device)]
 

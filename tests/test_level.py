@@ -13,10 +13,10 @@ from langflash_core.errors import InputError
 from langflash_core.level import (
     NOT_SURE,
     Evidence,
+    apply_measurement,
     found_world,
-    guessed,
-    levelled,
-    measured,
+    guess_scale,
+    level_scene,
     measured_by,
     seen_at,
     upright,
@@ -119,11 +119,11 @@ def test_a_told_height_makes_metres(room, world):
 
 def test_a_known_length_makes_metres(room):
     a, b = seen_at(room, 0, 30, 40), seen_at(room, 0, 70, 40)
-    told = measured(room, a, b, 3.0)
+    told = apply_measurement(room, a, b, 3.0)
     assert told.record.metric_scale is not None
     assert told.record.metric_scale * math.dist(a, b) == pytest.approx(3.0)
     with pytest.raises(InputError, match="one point"):
-        measured(room, a, a, 3.0)
+        apply_measurement(room, a, a, 3.0)
     for pixel in ((2, 5, 5), (0, 500, 5)):
         with pytest.raises(InputError, match="no pixel"):
             seen_at(room, *pixel)
@@ -135,14 +135,14 @@ def test_a_pixel_shows_the_point_that_lies_behind_it(room):
 
 
 def test_evidence_is_weighed_and_what_stands_alone_left_out():
-    assert guessed([]) is None
-    alone = guessed([Evidence("depth", 2.2, 0.05)])
+    assert guess_scale([]) is None
+    alone = guess_scale([Evidence("depth", 2.2, 0.05)])
     assert alone is not None and alone.metres == pytest.approx(2.2, rel=1e-6)
     assert math.log(alone.high / alone.low) / 2 == pytest.approx(0.05, rel=0.01)
-    both = guessed([Evidence("door", 2.0, 0.05, 2.0), Evidence("depth", 2.2, 0.05)])
+    both = guess_scale([Evidence("door", 2.0, 0.05, 2.0), Evidence("depth", 2.2, 0.05)])
     assert both is not None and both.metres == pytest.approx(math.sqrt(2.0 * 2.2), rel=0.02)
     heights = Evidence("door", 9.0, 0.05, 2.0), Evidence("ceiling", 2.0, 0.05, 2.6)
-    found = guessed([*heights, Evidence("depth", 2.1, 0.2)])
+    found = guess_scale([*heights, Evidence("depth", 2.1, 0.2)])
     assert found is not None and found.by == ("ceiling", "depth") and 1.9 < found.metres < 2.1
 
 
@@ -150,7 +150,7 @@ def test_heights_over_a_table_top_do_not_tell_how_large_it_is():
     """Of a scene of 1 m a unit, seen from 1.5 m, whose "floor" is a table of .75 m: its camera is
     .75 high, its ceiling 1.85."""
     told = [Evidence("ceiling", 2.6 / 1.85, 0.09, 2.6), Evidence("camera height", 1.5 / 0.75, 0.2, 1.5)]
-    found = guessed([*told, Evidence("depth", 1.0, 0.22)])
+    found = guess_scale([*told, Evidence("depth", 1.0, 0.22)])
     assert found is not None and found.by == ("depth",)
     assert found.low < 1 < found.metres < 1.2  # the mean by errors is 1.40
     weights = [1 / each.error**2 for each in (*told, Evidence("depth", 1.0, 0.22))]
@@ -201,11 +201,11 @@ def test_where_the_lowest_is_not_level_the_floor_is_the_lowest_that_is():
 
 def test_a_scene_is_levelled_unasked_only_where_that_is_sure(room, monkeypatch):
     """Surfaces lean, so their word is not taken unasked; what edges say is, beside the same tensors."""
-    unsure = levelled(room)
+    unsure = level_scene(room)
     assert unsure.record.world is None and unsure.record.warnings[-1] == NOT_SURE
     stands = World((1.0, 0.0, 0.0, 0.0), (0.0, 0.0, 0.0), "edges", SURE)
     monkeypatch.setattr(level, "found_world", lambda scene: stands)
-    sure = levelled(room)
+    sure = level_scene(room)
     assert sure.record.world == stands and sure.record.warnings == room.record.warnings
     assert sure.gaussians is room.gaussians and sure.semantics is room.semantics
     assert not replace(stands, up_error=SURE + 0.1).sure and replace(stands, up_by="told", up_error=9.0).sure
@@ -213,4 +213,4 @@ def test_a_scene_is_levelled_unasked_only_where_that_is_sure(room, monkeypatch):
 
 def test_a_scene_of_nothing_is_levelled_to_nothing(room):
     nothing = room.rows(torch.zeros(len(room.gaussians), dtype=torch.bool))
-    assert levelled(nothing) is nothing
+    assert level_scene(nothing) is nothing

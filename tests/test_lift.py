@@ -13,7 +13,7 @@ from langflash_core.lift import LIFTING, UPS, lift, likeness, own_cameras, own_v
 from langflash_core.scene.bare import bare_scene
 from langflash_core.scene.checks import check_scene
 from langflash_core.splat import rasterize, render
-from langflash_core.splat.backprojection import gathered
+from langflash_core.splat.backprojection import backproject
 from langflash_core.types import Camera, Frame, Gaussians, Scene
 from tests.app.cli.conftest import stripes
 from tests.export.splats import random_gaussians
@@ -37,10 +37,10 @@ def test_gathering_is_the_transpose_of_splatting():
     doubled = gaussians.map(lambda v: v.double())
     maps, _ = rasterize(doubled, features, camera)
     (maps * (values * trust[..., None])).sum().backward()
-    sums, totals = gathered(gaussians, camera, values, trust)
+    sums, totals = backproject(gaussians, camera, values, trust)
     assert features.grad is not None
     assert torch.allclose(sums.double(), features.grad, atol=1e-4)
-    ones, _ = gathered(gaussians, camera, torch.ones(24, 32, 1), trust)
+    ones, _ = backproject(gaussians, camera, torch.ones(24, 32, 1), trust)
     assert torch.allclose(ones[:, 0], totals)
     assert float(totals.max()) > 1  # some Gaussian is seen by more than a pixel's worth
 
@@ -48,7 +48,7 @@ def test_gathering_is_the_transpose_of_splatting():
 def test_shares_stay_shares():
     gaussians, camera = random_gaussians(80), small_camera()
     values = torch.rand(24, 32, 4).softmax(-1)
-    sums, totals = gathered(gaussians, camera, values)
+    sums, totals = backproject(gaussians, camera, values)
     seen = totals > 1e-4
     shares = sums[seen] / totals[seen, None]
     assert bool(seen.any()) and bool((shares >= 0).all())
@@ -57,9 +57,9 @@ def test_shares_stay_shares():
 
 def test_values_of_another_size_are_refused(unchecked):
     with pytest.raises(ValueError, match="values: expected"):
-        gathered(random_gaussians(3), small_camera(), torch.zeros(24, 31, 2))
+        backproject(random_gaussians(3), small_camera(), torch.zeros(24, 31, 2))
     with pytest.raises(ValueError, match="trust: expected"):
-        gathered(random_gaussians(3), small_camera(), torch.zeros(24, 32, 2), torch.zeros(3, 3))
+        backproject(random_gaussians(3), small_camera(), torch.zeros(24, 32, 2), torch.zeros(3, 3))
 
 
 @pytest.fixture

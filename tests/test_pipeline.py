@@ -14,9 +14,9 @@ import langflash_core as lf
 from langflash_core.base.records import FoundFocal
 from langflash_core.base.resources import asset_path
 from langflash_core.errors import Cancelled, ImageError, InputError, PromptError, ViewError, WeightsError
-from langflash_core.images.straight import straightened
+from langflash_core.images.straight import straighten_views
 from langflash_core.language.spaces import language_space
-from langflash_core.level import levelled
+from langflash_core.level import level_scene
 from langflash_core.network import PRESETS, GuidedDepthNet, build_network, save_network
 from langflash_core.reconstruction import stages
 from langflash_core.reconstruction.views import found_views, straight_prediction
@@ -90,7 +90,7 @@ def test_the_scene_is_levelled_beside_its_tensors(scene):
     """By its photos' edges where they tell, else it says that they do not."""
     world = scene.record.world
     assert (world is None) == any("which way is up" in warning for warning in scene.record.warnings)
-    again = levelled(replace(scene, record=replace(scene.record, world=None, warnings=())))
+    again = level_scene(replace(scene, record=replace(scene.record, world=None, warnings=())))
     assert again.record.world == world
     assert again.gaussians is scene.gaussians and again.viewmats is scene.viewmats
 
@@ -193,7 +193,7 @@ def test_photos_are_straightened_until_nothing_bends(rounds, unchecked):
     [bend] = views.lenses.straightened
     total = sum(0.05 / 4 ** (i + 1) for i in range(min(rounds, 3)))
     assert bend is not None and bend.bend == pytest.approx(-total)
-    assert torch.equal(views.images, straightened(taken, [bend]).images)
+    assert torch.equal(views.images, straighten_views(taken, [bend]).images)
     [told] = views.lenses.found([FoundFocal(1.0, 0.01, 2)])
     assert told.bend == bend.bend and "straightened by k1 = -0.0" in str(told)
 

@@ -11,7 +11,7 @@ from langflash_core.types import Camera, Gaussians, Record, Scene, Semantics
 
 def test_a_resized_camera_sees_the_same_rays():
     K = torch.tensor([[50.0, 0, 17], [0, 60.0, 13], [0, 0, 1]])
-    camera = Camera(torch.eye(4), K, 40, 30).resized(80, 90)
+    camera = Camera(torch.eye(4), K, 40, 30).with_size(80, 90)
     assert (camera.width, camera.height) == (80, 90)
     assert torch.allclose(camera.K, torch.tensor([[100.0, 0, 34], [0, 180.0, 39], [0, 0, 1]]))
 

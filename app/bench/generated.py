@@ -10,7 +10,7 @@ from torch.nn.functional import normalize
 from langflash_core.geometry.cameras import intrinsics_from_fov, invert_rigid
 from langflash_core.geometry.harmonics import SH_C0
 from langflash_core.language.relevance import CompiledQuery, reduce_dictionary
-from langflash_core.scene.weights import renormalised
+from langflash_core.scene.weights import renormalise
 from langflash_core.types import Gaussians, Scene, Semantics
 
 SPACE = "generated"
@@ -102,7 +102,7 @@ def with_atoms(scene: Scene, num_atoms: int, seed: int = 0) -> Scene:
     for rows in means.split(_ROWS_AT_ONCE):
         shares = torch.softmax(-torch.cdist(rows, centres).square() / (_SOFTNESS * width), -1)
         chunks.append(shares.topk(min(KEPT, num_atoms), -1))
-    values = renormalised(torch.cat([chunk.values for chunk in chunks]))
+    values = renormalise(torch.cat([chunk.values for chunk in chunks]))
     ids = torch.cat([chunk.indices for chunk in chunks])
     common = normalize(torch.randn(1, CHANNELS, generator=g), dim=-1)
     atoms = normalize(common + normalize(torch.randn(num_atoms, CHANNELS, generator=g), dim=-1), dim=-1)

@@ -108,7 +108,7 @@ class _Bench:
         camera = self.case.path.cameras[frame + 1]
         if mode.shrink == 1:
             return camera
-        return camera.resized(max(1, camera.width // mode.shrink), max(1, camera.height // mode.shrink))
+        return camera.with_size(max(1, camera.width // mode.shrink), max(1, camera.height // mode.shrink))
 
     def prepared(self, mode: Mode) -> SplatRenderer:
         """The mode's renderer as it stands before it sees a frame's camera: nothing counts as drawn."""

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from typing import Literal
 
 from langflash_core.scene.thin import thin
-from langflash_core.scene.weights import renormalised
+from langflash_core.scene.weights import renormalise
 from langflash_core.types import Scene
 
 
@@ -38,7 +38,7 @@ class Mode:
             return scene
         values, places = semantics.weight_values.topk(self.kept, dim=-1)
         kept = replace(
-            semantics, weight_ids=semantics.weight_ids.gather(1, places), weight_values=renormalised(values)
+            semantics, weight_ids=semantics.weight_ids.gather(1, places), weight_values=renormalise(values)
         )
         return replace(scene, semantics=kept)
 

@@ -61,7 +61,7 @@ def camera_path(scene: Scene, size: tuple[int, int], num_frames: int) -> Path:
             )
             for i in range(num_frames + 1)
         ]
-    return Path(tuple(camera.resized(*size) for camera in cameras), kind)
+    return Path(tuple(camera.with_size(*size) for camera in cameras), kind)
 
 
 def _between(viewmats: Tensor, num_frames: int) -> Tensor:

@@ -82,7 +82,7 @@ def summary(strip: Strip, choice: Choice) -> dict[str, Any]:
     return {
         "film": strip.film,
         "seconds": strip.seconds,
-        "frames_looked_at": strip.looked,
+        "frames_looked_at": strip.num_looked_at,
         "chosen": len(choice.chosen),
         "left_out": choice.left,
         "widest_gap": round(choice.gap, 3),
@@ -99,4 +99,4 @@ def sentence(strip: Strip, choice: Choice) -> str:
     """The same for people."""
     left = [f"{choice.left[key]} {said}" for key, said in REASONS.items() if choice.left[key]]
     rest = f"; {', '.join(left)}" if left else ""
-    return f"{len(choice.chosen)} of {strip.looked} frames{rest}"
+    return f"{len(choice.chosen)} of {strip.num_looked_at} frames{rest}"

@@ -11,7 +11,7 @@ from typing import Any, TextIO
 
 from langflash_core.base.files import make_folder, write_atomically
 from langflash_core.base.memory import out_of_memory
-from langflash_core.base.running import left
+from langflash_core.base.running import time_left
 from langflash_core.errors import LangFlashError
 
 INTERRUPTED = 130
@@ -92,7 +92,7 @@ class ProgressBar:
         done = round(self.WIDTH * min(max(fraction, 0.0), 1.0))
         bar = "#" * done + "." * (self.WIDTH - done)
         seconds = time.monotonic() - self.start
-        rest = left(seconds, fraction)
+        rest = time_left(seconds, fraction)
         line = f"[{bar}] {seconds:5.1f} s  {stage}{', ' if rest else ''}{rest}"
         line = line[: shutil.get_terminal_size().columns - 1]  # a second line could not be wiped
         self.stream.write("\r" + line.ljust(self.drawn))

@@ -30,6 +30,6 @@ def open_scene(path: Path, axes: str | None = None) -> Scene:
 
 def say_hints(scene: Scene, phrases: Sequence[str], *, narrowing: bool = True) -> None:
     """What people should know of phrases that a scene is asked, on stderr; narrowing: as `told`."""
-    from langflash_core.language.spoken import told
+    from langflash_core.language.spoken import phrase_notes
 
-    say_warnings(hint for hint in dict.fromkeys(told(scene, phrases, narrowing=narrowing)) if hint)
+    say_warnings(hint for hint in dict.fromkeys(phrase_notes(scene, phrases, narrowing=narrowing)) if hint)

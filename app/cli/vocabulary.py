@@ -17,8 +17,10 @@ def taught_by(path: Path | None) -> "Callable[[Scene], Scene]":
     """
     if path is None:
         return lambda scene: scene
-    from langflash_core.appearance import own_network, taken
+    from langflash_core.appearance import lessons_taken, own_network
     from langflash_core.language.lessons import read_lessons, with_lessons
 
     lessons, network = read_lessons(path), own_network()
-    return lambda scene: replace(scene, record=with_lessons(scene.record, taken(scene, lessons, network)))
+    return lambda scene: replace(
+        scene, record=with_lessons(scene.record, lessons_taken(scene, lessons, network))
+    )

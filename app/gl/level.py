@@ -7,7 +7,7 @@ from typing import Protocol
 import numpy as np
 import torch
 
-from langflash_core.scene.changed import changed
+from langflash_core.scene.changed import apply_changes
 from langflash_core.scene.changes import Change
 from langflash_core.types import Camera, Gaussians
 
@@ -92,7 +92,7 @@ class Level:
 
     def _place(self) -> None:
         if self._changes is not None:
-            self.splats.place(changed(self._gaussians, self._changes, torch.from_numpy(self._rows)))
+            self.splats.place(apply_changes(self._gaussians, self._changes, torch.from_numpy(self._rows)))
             self._changes = None
 
     def ready(self, camera: Camera, quick: bool = False, late: bool = False) -> bool:

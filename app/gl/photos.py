@@ -86,7 +86,7 @@ def photo_places(scene: Scene, camera: Camera) -> np.ndarray:
 
 def _small(camera: Camera) -> Camera:
     ratio = min(1.0, LONGEST_SIDE / max(camera.width, camera.height))
-    return camera.resized(max(1, round(camera.width * ratio)), max(1, round(camera.height * ratio)))
+    return camera.with_size(max(1, round(camera.width * ratio)), max(1, round(camera.height * ratio)))
 
 
 def lens(camera: Camera) -> dict[str, np.ndarray | int]:

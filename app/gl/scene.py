@@ -10,7 +10,7 @@ import numpy as np
 from langflash_core.base.graphics import Programs
 from langflash_core.export.colours import atom_colours
 from langflash_core.geometry.nearness import Nearness
-from langflash_core.scene.changed import changed
+from langflash_core.scene.changed import apply_changes
 from langflash_core.scene.changes import Change
 from langflash_core.scene.thin import thin_with_rows
 from langflash_core.types import Scene
@@ -92,7 +92,7 @@ class LiveScene:
     def nearness(self) -> Nearness:
         """Which layers a camera sees, of a layered scene as edits left it."""
         if self._near is None:
-            gaussians = changed(self.scene.gaussians, self._changes)
+            gaussians = apply_changes(self.scene.gaussians, self._changes)
             self._near = Nearness.of(replace(self.scene, gaussians=gaussians))
         return self._near
 
@@ -101,7 +101,7 @@ class LiveScene:
         once."""
         own = own or self.scene.layered
         if own not in self._photos:
-            gaussians = changed(self.scene.gaussians, self._changes)
+            gaussians = apply_changes(self.scene.gaussians, self._changes)
             self._photos[own] = PhotoDepths(self._painter, replace(self.scene, gaussians=gaussians), own)
         return self._photos[own]
 

@@ -39,7 +39,7 @@ def write_atomically(path: Path, content: bytes | Iterable[bytes]) -> None:
         state = "is a file" if os.path.exists(folder) else "does not exist"
         raise OutputError(f"cannot write {path}: {folder} {state}; create that folder first")
     temporary = part_beside(place)
-    with _cleared(path, temporary):
+    with _clear_temporaries(path, temporary):
         with temporary.open("xb") as stream:
             for part in (content,) if isinstance(content, bytes) else content:
                 stream.write(part)
@@ -61,7 +61,7 @@ def written_atomically(path: Path, library: type[Exception] = OSError) -> Iterat
     place = place_of(path)
     make_folder(place.parent)
     temporary = part_beside(place)
-    with _cleared(path, temporary, library=library):
+    with _clear_temporaries(path, temporary, library=library):
         yield temporary
         os.replace(temporary, place)
 
@@ -78,7 +78,7 @@ def filled_atomically(folder: Path) -> Iterator[Path]:
     temporary, old = part_beside(folder), part_beside(folder)
     if os.path.exists(folder) and not os.path.isdir(folder):
         raise OutputError(f"cannot write {folder}: a file of that name is in the way; choose another place")
-    with _cleared(folder, temporary, old):
+    with _clear_temporaries(folder, temporary, old):
         temporary.mkdir()
         yield temporary
         if os.path.isdir(folder):
@@ -180,7 +180,7 @@ def make_folder(folder: Path) -> None:
 
 
 @contextmanager
-def _cleared(path: Path, *temporaries: Path, library: type[Exception] = OSError) -> Iterator[None]:
+def _clear_temporaries(path: Path, *temporaries: Path, library: type[Exception] = OSError) -> Iterator[None]:
     """The system's refusals inside are sentences about `path`; `temporaries` are gone afterwards.
 
     Raises:

@@ -53,7 +53,7 @@ class Keep:
             OutputError: it cannot be written.
         """
         path = self.folder / f"{name}-{self.key}{_ENDING}"
-        found = _read(path)
+        found = _load_arrays(path)
         if found is not None:
             self.found.append(name)
             return found
@@ -81,7 +81,7 @@ def holds_steps(folder: Path) -> bool:
     return next(folder.glob(f"*{_ENDING}"), None) is not None
 
 
-def _read(path: Path) -> dict[str, np.ndarray] | None:
+def _load_arrays(path: Path) -> dict[str, np.ndarray] | None:
     try:
         with path.open("rb") as stream, np.load(stream, allow_pickle=False) as stored:
             found = {name: stored[name] for name in stored.files}

@@ -57,6 +57,6 @@ def together(parts: Iterable[Shaped[Tensor, "..."]], count: int, dim: int = 0) -
     return whole
 
 
-def held(values: Shaped[Tensor, "*any"], count: int) -> Shaped[Tensor, "*any"]:
+def in_half_precision(values: Shaped[Tensor, "*any"], count: int) -> Shaped[Tensor, "*any"]:
     """What stays of `count` photos: of many in half precision."""
     return values if count <= FEW else values.half()

@@ -350,7 +350,7 @@ def help_of_words() -> str:
     return f"{'; '.join(said)}; without it a .png is a picture, or, with --prompt, a cut-out"
 
 
-def loaded(reference: str) -> Callable[..., Any]:
+def import_reference(reference: str) -> Callable[..., Any]:
     """What a record names, imported now."""
     module, _, function = reference.partition(":")
     return getattr(import_module(f"langflash_core.{module}"), function)

@@ -59,7 +59,7 @@ def opened_picture(
         if start[4:8] == b"ftyp" and _APART & set(formats):
             yield _decoded_apart(stream.read())
         else:
-            with _identified(stream, formats, start) as picture:
+            with _identify(stream, formats, start) as picture:
                 yield picture
     except Image.DecompressionBombError as error:
         raise TooManyPixels(f"it has more than {PIXELS.told()}") from error
@@ -101,7 +101,7 @@ def stored_shape(picture: Image.Image) -> tuple[tuple[int, int], int]:
     return (height, width) if told_upright else (width, height), orientation
 
 
-def _identified(stream: BufferedIOBase, formats: tuple[str, ...], start: bytes) -> Image.Image:
+def _identify(stream: BufferedIOBase, formats: tuple[str, ...], start: bytes) -> Image.Image:
     if start[:2] in (b"II", b"MM"):
         _quiet_tiff()
     Image.init()  # all plug-ins; only those named are let in

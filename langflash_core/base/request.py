@@ -91,10 +91,10 @@ class ExportRequest:
         for name in ("what", "threshold", "view", "camera", "size", "backend", "seconds", "path", "axes"):
             value = getattr(self, name)
             said = value + 1 if name == "view" and value is not None else value  # people count from 1
-            words += [] if value is None else [f"--{name}", _said(said)]
+            words += [] if value is None else [f"--{name}", _as_argument(said)]
         words += [] if self.colormap == COLOUR_MAPS[0] else ["--colormap", self.colormap]
         if self.span is not None:  # in one word where it begins like an option
-            low_high = _said(self.span)
+            low_high = _as_argument(self.span)
             words += [f"--span={low_high}"] if low_high.startswith("-") else ["--span", low_high]
         words += [] if self.detail == EXPORT_DETAILS[0] else ["--detail", self.detail]
         for name in ("all_views", "fade", "fill", "ortho", "with_text", "upright", "replace"):
@@ -122,7 +122,7 @@ class ExportRequest:
         return kind
 
 
-def spoken(prompts: Sequence[str]) -> list[str]:
+def trim_phrases(prompts: Sequence[str]) -> list[str]:
     """Phrases without the white space around them.
 
     Raises:
@@ -134,10 +134,10 @@ def spoken(prompts: Sequence[str]) -> list[str]:
     return phrases
 
 
-def _said(value: object) -> str:
+def _as_argument(value: object) -> str:
     """A value as the command line reads it."""
     if isinstance(value, tuple):
-        return ("x" if isinstance(value[0], int) else ",").join(map(_said, value))
+        return ("x" if isinstance(value[0], int) else ",").join(map(_as_argument, value))
     return f"{value:g}" if isinstance(value, float) and float(f"{value:g}") == value else str(value)
 
 

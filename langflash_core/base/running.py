@@ -18,7 +18,7 @@ T = TypeVar("T")
 _TOLD_FROM, _SURE_FROM = 3.0, 0.05  # seconds, and share of the whole, before which nobody knows what is left
 
 
-def left(seconds: float, fraction: float) -> str:
+def time_left(seconds: float, fraction: float) -> str:
     """What is left of work of which so much was done in so long: "about 40 s left"; nothing where that says
     nothing yet."""
     if seconds < _TOLD_FROM or not _SURE_FROM <= fraction < 1:

@@ -74,7 +74,7 @@ class RayWorkers:
     def wait(self, seconds: float) -> list[tuple[Job, Made | Lost]]:
         """What has ended; waits at most so long for the first."""
         ready, _ = self._ray.wait(list(self._jobs), timeout=seconds)
-        return [self._ended(reference) for reference in ready]
+        return [self._take_result(reference) for reference in ready]
 
     def close(self) -> None:
         """End all actors, also in the middle of a job, and leave the cluster."""
@@ -84,7 +84,7 @@ class RayWorkers:
         self._jobs.clear()
         self._ray.shutdown()
 
-    def _ended(self, reference: Any) -> tuple[Job, Made | Lost]:
+    def _take_result(self, reference: Any) -> tuple[Job, Made | Lost]:
         job, actor = self._jobs.pop(reference)
         try:
             made = self._ray.get(reference)

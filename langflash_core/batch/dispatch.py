@@ -100,9 +100,9 @@ def dispatch(
             if lost[job.name] < TRIES:
                 waiting.appendleft(job)
             else:
-                yield Ended(job, Made(_died(outcome)), TRIES - 1)
+                yield Ended(job, Made(_death_message(outcome)), TRIES - 1)
     tick()
 
 
-def _died(outcome: Lost) -> str:
+def _death_message(outcome: Lost) -> str:
     return f"its worker died twice ({outcome.how}); if memory is short, try fewer --workers"

@@ -57,7 +57,7 @@ class Ledger:
             OutputError: a file of that name is something else.
         """
         self.path, self.item = path, item
-        self.rows: dict[str, Row] = {row.name: row for row in _read(path)}
+        self.rows: dict[str, Row] = {row.name: row for row in _read_rows(path)}
 
     def begin(self, again: Iterable[str]) -> None:
         """Forget the rows of sets that are about to be done again, and make the file.
@@ -102,7 +102,7 @@ def _lines(rows: Iterable[Row]) -> bytes:
     return stream.getvalue().encode()
 
 
-def _read(path: Path) -> list[Row]:
+def _read_rows(path: Path) -> list[Row]:
     try:
         text = path.read_bytes().decode(errors="replace")
     except FileNotFoundError:

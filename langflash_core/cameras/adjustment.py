@@ -25,7 +25,7 @@ from langflash_core.cameras.inputs import (
 from langflash_core.cameras.keypoints import KeyPoints
 from langflash_core.cameras.known import agreeing
 from langflash_core.cameras.matching import Matches
-from langflash_core.cameras.tracks import Tracks, joined, no_tracks, thinned, with_pairs
+from langflash_core.cameras.tracks import Tracks, join_matches, no_tracks, thin_tracks, with_pairs
 from langflash_core.rig.settings import ADJUSTMENT, MATCHING, Adjustment
 
 Agreed = dict[tuple[int, int], Matches]
@@ -92,14 +92,14 @@ def adjusted_photos(
     counts = np.bincount(np.array(sought.lenses)[placed], minlength=len(sought.doubts))
     doubts = np.where(counts >= ADJUSTMENT.fewest, np.array(sought.doubts), 0.0)
     while True:
-        adjusted = _adjusted(
+        adjusted = _run_rounds(
             list(views), points, start, agreed, np.array(sought.lenses), doubts, check, settings=settings
         )
         if adjusted is None:
             return None
         bundle, matches = adjusted
         growths = np.exp(bundle.growths)
-        lost = (doubts > 0) & ~_told(
+        lost = (doubts > 0) & ~_determined_lenses(
             views, np.array(sought.lenses), growths, bundle.errors * settings.shared, settings=settings
         )
         if not lost.any():
@@ -120,7 +120,7 @@ def adjusted_photos(
     )
 
 
-def _told(
+def _determined_lenses(
     views: Sequence[PoseInput],
     lenses: np.ndarray,
     growths: np.ndarray,
@@ -146,7 +146,7 @@ def _with_bends(
     settings: Adjustment = ADJUSTMENT,
 ) -> tuple[FoundFocal | None, ...]:
     """The lenses (G,) with their bends, where photos show some: adjusted again, from straight lines on."""
-    tracks = thinned(_tracks(views, points, agreed, settings=settings), settings.observations[-1])
+    tracks = thin_tracks(_tracks(views, points, agreed, settings=settings), settings.observations[-1])
     focals = np.array([view.K[0, 0] for view in views])
     optics = Optics(
         focals,
@@ -173,7 +173,7 @@ def _with_bends(
     )
 
 
-def _adjusted(
+def _run_rounds(
     views: list[PoseInput],
     points: KeyPoints,
     start: Placed,
@@ -190,7 +190,7 @@ def _adjusted(
     viewmats, matches, bundle = start.viewmats, agreed, None
     for most in settings.observations:
         check()
-        tracks = thinned(_tracks(views, points, matches, settings=settings), most)
+        tracks = thin_tracks(_tracks(views, points, matches, settings=settings), most)
         if not len(tracks):
             return None
         depths = log_depths(views, tracks)
@@ -226,7 +226,7 @@ def _tracks(
         for view, focal in zip(views, focals, strict=True)
     ]
     exact = {edge: matches.key_points[matches.key_points[:, 0] >= 0] for edge, matches in agreed.items()}
-    tracks = joined(positions, exact, sigmas) if positions else no_tracks()
+    tracks = join_matches(positions, exact, sigmas) if positions else no_tracks()
     dense = []
     for (i, j), matches in agreed.items():
         own = matches.key_points[:, 0] < 0

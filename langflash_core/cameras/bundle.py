@@ -87,7 +87,7 @@ class _Problem:
         return _Problem(optics, tracks, log_depths, shares)
 
     @property
-    def sought(self) -> np.ndarray:
+    def free_unknowns(self) -> np.ndarray:
         """Which of the C unknowns are: all poses but the first, and the lenses in doubt."""
         poses = np.arange(_POSE * len(self.optics.focals)) >= _POSE
         return np.concatenate((poses, self.optics.lens_doubts > 0))
@@ -134,7 +134,7 @@ def adjusted_bundle(
     state = _State(viewmats, logs, np.zeros((0, 3)), growths, np.zeros_like(growths))
     state = replace(state, points=_first_points(state, problem))
     for left in reversed(range(BUNDLE.rounds)):
-        state = _solved(state, problem, BUNDLE.nearly if left else BUNDLE.converged)
+        state = _solve(state, problem, BUNDLE.nearly if left else BUNDLE.converged)
         if left:
             state, problem = _without_outliers(state, problem)
     spread, errors, unsure = _errors(state, problem)
@@ -144,12 +144,12 @@ def adjusted_bundle(
     return Bundle(*found, problem.tracks, depths, depth_errors)
 
 
-def _solved(state: _State, problem: _Problem, converged: float) -> _State:
+def _solve(state: _State, problem: _Problem, converged: float) -> _State:
     damping, cost = 1e-3, _cost(state, problem)
     for _ in range(BUNDLE.iterations):
         system, gain = _System.of(state, problem), 0.0
         while gain <= 0 and damping < 1e8:
-            trial = _moved(state, problem, *_step(problem, system, damping))
+            trial = _apply_step(state, problem, *_step(problem, system, damping))
             gain = cost - _cost(trial, problem)
             damping = max(damping / 5, 1e-9) if gain > 0 else damping * 8
         if not gain > 0:
@@ -183,7 +183,7 @@ def _firsts(tracks: Tracks) -> np.ndarray:
     return np.flatnonzero(np.diff(tracks.points, prepend=-1))
 
 
-def _turned(state: _State, problem: _Problem) -> np.ndarray:
+def _rotate_points(state: _State, problem: _Problem) -> np.ndarray:
     """Points turned to the cameras that see them, before the shift, (M, 3)."""
     tracks = problem.tracks
     return np.einsum("mij,mj->mi", state.viewmats[tracks.views, :3, :3], state.points[tracks.points])
@@ -192,7 +192,7 @@ def _turned(state: _State, problem: _Problem) -> np.ndarray:
 def _residuals(state: _State, problem: _Problem) -> np.ndarray:
     """(M, 3) in sigmas: reprojection x, y; log depth against the map."""
     tracks = problem.tracks
-    pos = _turned(state, problem) + state.viewmats[tracks.views, :3, 3]
+    pos = _rotate_points(state, problem) + state.viewmats[tracks.views, :3, 3]
     z = np.maximum(pos[:, 2], 1e-6)
     bent = 1 + problem.bends(state) * (pos[:, :2] ** 2).sum(1) / z**2
     scale = problem.focals(state) / z * bent
@@ -224,7 +224,7 @@ def _jacobians(state: _State, problem: _Problem) -> tuple[np.ndarray, np.ndarray
     dp / dq = f exp(g) ((1 + k |q|^2) I + 2 k q q^T), and along the ray -q times that.
     """
     tracks, bends, focals = problem.tracks, problem.bends(state), problem.focals(state)
-    turned = _turned(state, problem)
+    turned = _rotate_points(state, problem)
     pos = turned + state.viewmats[tracks.views, :3, 3]
     z = np.maximum(pos[:, 2], 1e-6)
     q = pos[:, :2] / z[:, None]
@@ -262,7 +262,7 @@ class _System:
         weights = _weights(residuals, problem)[..., None]
         to_camera, to_point = _jacobians(state, problem)
         weighted = (to_camera * weights).transpose(0, 2, 1)  # (M, 9, 3)
-        columns, sought = problem.columns, problem.sought
+        columns, sought = problem.columns, problem.free_unknowns
         count = len(sought)
         places = (columns[:, :, None] * count + columns[:, None]).ravel()
         hessian = np.bincount(places, (weighted @ to_camera).ravel(), count * count).reshape(count, count)
@@ -296,7 +296,9 @@ def _priors(state: _State, problem: _Problem) -> tuple[np.ndarray, np.ndarray]:
     return precisions, np.concatenate((poses.ravel(), lens * state.lenses))
 
 
-def _reduced(system: _System, damping: float) -> tuple[np.ndarray, np.ndarray, scipy.sparse.csr_matrix]:
+def _schur_complement(
+    system: _System, damping: float
+) -> tuple[np.ndarray, np.ndarray, scipy.sparse.csr_matrix]:
     """Hessian (C', C') without the points, inverses (P, 3, 3) of theirs, and cross times those."""
     diagonal = np.einsum("pii->pi", system.own)
     count = len(diagonal)
@@ -312,15 +314,15 @@ def _reduced(system: _System, damping: float) -> tuple[np.ndarray, np.ndarray, s
 
 def _step(problem: _Problem, system: _System, damping: float) -> tuple[np.ndarray, np.ndarray]:
     """Of all C unknowns, 0 where they are not sought, and of the points (P, 3)."""
-    reduced, inverses, spread = _reduced(system, damping)
+    reduced, inverses, spread = _schur_complement(system, damping)
     step = -np.linalg.solve(reduced, system.gradient - spread @ system.own_gradient)
     rest = (system.own_gradient + system.cross.T @ step).reshape(-1, 3)
-    found = np.zeros(len(problem.sought))
-    found[problem.sought] = step
+    found = np.zeros(len(problem.free_unknowns))
+    found[problem.free_unknowns] = step
     return found, -np.einsum("pij,pj->pi", inverses, rest)
 
 
-def _moved(state: _State, problem: _Problem, step: np.ndarray, shifts: np.ndarray) -> _State:
+def _apply_step(state: _State, problem: _Problem, step: np.ndarray, shifts: np.ndarray) -> _State:
     num_views = len(state.viewmats)
     poses = step[: _POSE * num_views].reshape(num_views, _POSE)
     growths, bends = step[_POSE * num_views :].reshape(2, -1)
@@ -331,13 +333,13 @@ def _moved(state: _State, problem: _Problem, step: np.ndarray, shifts: np.ndarra
     return _State(
         viewmats,
         state.logs + poses[:, 6],
-        state.points + shifts * _held(state, problem, shifts)[:, None],
+        state.points + shifts * _limit_steps(state, problem, shifts)[:, None],
         state.growths + np.clip(growths, -0.2, 0.2),
         state.bends + np.clip(bends, -0.1, 0.1),
     )
 
 
-def _held(state: _State, problem: _Problem, shifts: np.ndarray) -> np.ndarray:
+def _limit_steps(state: _State, problem: _Problem, shifts: np.ndarray) -> np.ndarray:
     """Share (P,) of each point's step that leaves it before every camera that sees it."""
     tracks = problem.tracks
     backs = state.viewmats[tracks.views, 2]
@@ -364,10 +366,10 @@ def _errors(state: _State, problem: _Problem) -> tuple[float, np.ndarray, float]
     that of where the cameras stand, as a share of how far they stand apart, whatever the unit of length."""
     residuals = _residuals(state, problem)
     weights = _weights(residuals, problem)
-    sought, num_views = problem.sought, len(state.viewmats)
+    sought, num_views = problem.free_unknowns, len(state.viewmats)
     free = 2 * len(residuals) - int(sought.sum()) - 3 * problem.tracks.num_points
     spread = float(np.sqrt((weights[:, :2] * residuals[:, :2] ** 2).sum() / max(free, 1)))
-    reduced, _, _ = _reduced(_System.of(state, problem), 0.0)
+    reduced, _, _ = _schur_complement(_System.of(state, problem), 0.0)
     larger = np.zeros((num_views, _POSE))  # the direction in which everything grows
     larger[:, 3:6], larger[:, 6] = state.viewmats[:, :3, 3], 1
     larger = np.concatenate((larger.ravel(), np.zeros(len(problem.optics.lens_doubts))))[sought]

@@ -32,12 +32,14 @@ class Placed:
     kept: tuple[tuple[int, int], ...]
 
 
-def placed(num_views: int, pairs: Pairs, settings: Graph = GRAPH) -> Placed:
+def place_views(num_views: int, pairs: Pairs, settings: Graph = GRAPH) -> Placed:
     """Places of all views: along the best-confirmed tree, then adjusted by all edges."""
-    return adjusted(chained(num_views, pairs, confirmed(pairs, settings=settings)), pairs, settings=settings)
+    return adjust_poses(
+        chain_poses(num_views, pairs, count_confirmations(pairs, settings=settings)), pairs, settings=settings
+    )
 
 
-def confirmed(pairs: Pairs, settings: Graph = GRAPH) -> dict[tuple[int, int], int]:
+def count_confirmations(pairs: Pairs, settings: Graph = GRAPH) -> dict[tuple[int, int], int]:
     """How many matches speak for each edge: its own, and in every triangle whose turns close, the fewest
     of the three."""
     counts = {edge: pose.num_inliers for edge, pose in pairs.items()}
@@ -55,7 +57,7 @@ def confirmed(pairs: Pairs, settings: Graph = GRAPH) -> dict[tuple[int, int], in
     return counts
 
 
-def chained(num_views: int, pairs: Pairs, strengths: Mapping[tuple[int, int], int]) -> Placed:
+def chain_poses(num_views: int, pairs: Pairs, strengths: Mapping[tuple[int, int], int]) -> Placed:
     """Prim's maximum spanning tree; scales and poses multiply along it."""
     viewmats = np.repeat(np.eye(4)[None], num_views, 0)
     scales = np.ones(num_views)
@@ -81,7 +83,7 @@ def chained(num_views: int, pairs: Pairs, strengths: Mapping[tuple[int, int], in
     return Placed(viewmats, scales, missing, tuple(edge for edge in pairs if edge[0] in reached))
 
 
-def adjusted(start: Placed, pairs: Pairs, settings: Graph = GRAPH) -> Placed:
+def adjust_poses(start: Placed, pairs: Pairs, settings: Graph = GRAPH) -> Placed:
     """The poses and scales under which the edges differ least from what their pairs say.
 
     Unknown per view but the first: a turn and a shift before its pose, and its log scale. An edge's
@@ -98,7 +100,7 @@ def adjusted(start: Placed, pairs: Pairs, settings: Graph = GRAPH) -> Placed:
     cost = _cost(viewmats, logs, pairs, precisions, settings=settings)
     for _ in range(settings.steps):
         step = _step(viewmats, logs, pairs, precisions, settings=settings)
-        trial, trial_logs = _moved(viewmats, logs, step)
+        trial, trial_logs = _apply_step(viewmats, logs, step)
         lower = _cost(trial, trial_logs, pairs, precisions, settings=settings)
         if not lower < cost:
             break
@@ -166,7 +168,7 @@ def _jacobians(relative: np.ndarray, log_i: float) -> tuple[np.ndarray, np.ndarr
     return of_i, of_j
 
 
-def _moved(viewmats: np.ndarray, logs: np.ndarray, step: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _apply_step(viewmats: np.ndarray, logs: np.ndarray, step: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     moves = np.repeat(np.eye(4)[None], len(viewmats), 0)
     for move, own in zip(moves, step, strict=True):
         move[:3, :3], move[:3, 3] = cv2.Rodrigues(own[:3])[0], own[3:6]

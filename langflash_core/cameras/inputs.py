@@ -27,10 +27,10 @@ class PoseInput:
 
     def through(self, growth: float) -> "PoseInput":
         """The same view through a lens of so many times the focal length."""
-        return replace(self, K=grown(self.K, growth))
+        return replace(self, K=scale_focal(self.K, growth))
 
 
-def grown(
+def scale_focal(
     K: Float[np.ndarray, "... 3 3"], growth: float | Float[np.ndarray, "..."]
 ) -> Float[np.ndarray, "... 3 3"]:
     """Intrinsics (..., 3, 3) of so many times (...) the focal length."""

@@ -74,7 +74,9 @@ class _Decoded(Sequence[np.ndarray]):
     @overload
     def __getitem__(self, index: slice) -> Sequence[np.ndarray]: ...
     def __getitem__(self, index: int | slice) -> np.ndarray | Sequence[np.ndarray]:
-        return _Decoded(self._sources[index]) if isinstance(index, slice) else decoded(self._sources[index])
+        return (
+            _Decoded(self._sources[index]) if isinstance(index, slice) else decode_grey(self._sources[index])
+        )
 
 
 def match_photos(
@@ -107,7 +109,7 @@ def match_photos(
     return KeyPoints(tuple(positions), matched)
 
 
-def decoded(source: bytes) -> UInt8[np.ndarray, "h w"]:
+def decode_grey(source: bytes) -> UInt8[np.ndarray, "h w"]:
     """A picture (h, w) uint8, grey, of JPEG bytes."""
     grey = cv2.imdecode(np.frombuffer(source, np.uint8), cv2.IMREAD_GRAYSCALE)
     assert grey is not None, "sources are JPEG bytes that images/ wrote"

@@ -28,7 +28,7 @@ def agreeing(matches: Matches, relative: Float[np.ndarray, "4 4"]) -> Matches:
     return matches.subset((distances < KNOWN_POSES.tolerance * matches.sigma) & ahead)
 
 
-def explained(matches: Matches, relative: Float[np.ndarray, "4 4"]) -> int:
+def count_explained(matches: Matches, relative: Float[np.ndarray, "4 4"]) -> int:
     """How many matches a pose explains, within `KNOWN_POSES.loose` standard deviations: by a point in front
     of both cameras, or by one that is far away.
 

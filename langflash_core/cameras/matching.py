@@ -134,11 +134,13 @@ def relative_pose(
     for _ in range(MATCHING.rounds):
         if best is None or best.num_inliers < MATCHING.fewest:
             return None
-        best = _score(matches, depth_i, depth_j, _refined(matches, depth_i, depth_j, best))
+        best = _score(matches, depth_i, depth_j, _refine_pose(matches, depth_i, depth_j, best))
     return best if best is not None and best.num_inliers >= MATCHING.fewest else None
 
 
-def _refined(matches: Matches, depth_i: np.ndarray, depth_j: np.ndarray, pose: RelativePose) -> RelativePose:
+def _refine_pose(
+    matches: Matches, depth_i: np.ndarray, depth_j: np.ndarray, pose: RelativePose
+) -> RelativePose:
     """The pose that all matches which agree with it say, not only those it was found with."""
     keep = pose.inliers
     return refine_pose(matches.subset(keep), depth_i[keep], depth_j[keep], pose.rotation, pose.translation)
@@ -247,7 +249,7 @@ def refine_pose(
     residuals, jac_pose, jac_depth = _linearise(state, matches, priors)
     agrees = np.linalg.norm(residuals[:, :2], axis=1) < MATCHING.inlier
     weights = priors.weigh(1 / (1 + (residuals / MATCHING.cauchy) ** 2))
-    information, _, _ = _reduced(weights, jac_pose, jac_depth, 0.0)
+    information, _, _ = _schur_complement(weights, jac_pose, jac_depth, 0.0)
     return RelativePose(state.rotation, state.translation, state.log_scale, agrees, cost, information)
 
 
@@ -318,7 +320,7 @@ def _linearise(
 
 def _solve(residuals, weights, jac_pose, jac_depth, log_scale, damping) -> tuple[np.ndarray, np.ndarray]:
     """One damped Gauss-Newton step: pose and scale (7,), depths (n,)."""
-    reduced, cross, own = _reduced(weights, jac_pose, jac_depth, damping)
+    reduced, cross, own = _schur_complement(weights, jac_pose, jac_depth, damping)
     gradient = residuals.ravel() @ (jac_pose * weights[..., None]).reshape(-1, 7)
     own_gradient = (weights * jac_depth * residuals).sum(1)
     gradient[6] += log_scale / MATCHING.scale_sigma**2
@@ -326,7 +328,9 @@ def _solve(residuals, weights, jac_pose, jac_depth, log_scale, damping) -> tuple
     return pose_step, -(own_gradient + cross @ pose_step) / own
 
 
-def _reduced(weights, jac_pose, jac_depth, damping: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def _schur_complement(
+    weights, jac_pose, jac_depth, damping: float
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Hessian (7, 7) of pose and scale without the depths; of both together (n, 7), and of depths (n,)."""
     weighted = jac_pose * weights[..., None]
     hessian = weighted.reshape(-1, 7).T @ jac_pose.reshape(-1, 7)

@@ -25,7 +25,7 @@ def choose_pair(
     features = []
     for grey in greys:
         check()
-        features.append(detect(_scaled(grey), FILM_PAIR.features))
+        features.append(detect(_resize_to_working_side(grey), FILM_PAIR.features))
     best, chosen = 0.0, None
     for i, j in combinations(range(len(greys)), 2):
         check()
@@ -35,7 +35,7 @@ def choose_pair(
     return chosen
 
 
-def _scaled(grey: np.ndarray) -> np.ndarray:
+def _resize_to_working_side(grey: np.ndarray) -> np.ndarray:
     ratio = FILM_PAIR.side / max(grey.shape)
     method = cv2.INTER_AREA if ratio < 1 else cv2.INTER_CUBIC
     return cv2.resize(grey, None, fx=ratio, fy=ratio, interpolation=method)

@@ -16,7 +16,7 @@ from langflash_core.cameras.adjustment import (
     log_depths,
 )
 from langflash_core.cameras.alignment import NO_CORRECTION, Correction, fit_correction
-from langflash_core.cameras.graph import Placed, placed
+from langflash_core.cameras.graph import Placed, place_views
 from langflash_core.cameras.inputs import (
     PoseInput,
     dense_matches,
@@ -25,7 +25,7 @@ from langflash_core.cameras.inputs import (
     with_dense,
 )
 from langflash_core.cameras.keypoints import KeyPoints
-from langflash_core.cameras.known import agreeing, depth_scales, doubt, explained, log_scales
+from langflash_core.cameras.known import agreeing, count_explained, depth_scales, doubt, log_scales
 from langflash_core.cameras.matching import (
     Matches,
     RelativePose,
@@ -99,12 +99,12 @@ def estimate_poses(
     edges = _edges(views, points, settings=settings)
     if known is None:
         pairs, agreed = _pair_poses(views, edges, check, settings=settings)
-        found = placed(num_views, pairs, settings.graph)
+        found = place_views(num_views, pairs, settings.graph)
         return _of_pairs(views, found, {edge: agreed[edge] for edge in found.kept}, settings=settings)
     agreed = {}
     for (i, j), matches in edges.items():
         check()
-        agreed[i, j] = _agreed(
+        agreed[i, j] = _agreeing_matches(
             views[i], views[j], matches, known[j] @ np.linalg.inv(known[i]), settings=settings
         )
     scales = _known_scales(views, known, agreed)
@@ -123,7 +123,9 @@ def _doubt(
     for i, j in sorted(edges, key=lambda edge: (-len(edges[edge]), edge))[: settings.checked]:
         sought = _pair_pose(views[i], views[j], edges[i, j], settings=settings)
         if sought is not None:
-            pairs.append((explained(edges[i, j], known[j] @ np.linalg.inv(known[i])), sought.num_inliers))
+            pairs.append(
+                (count_explained(edges[i, j], known[j] @ np.linalg.inv(known[i])), sought.num_inliers)
+            )
     return doubt(pairs)
 
 
@@ -151,15 +153,15 @@ def _together(
     growths, solved = np.ones(len(views)), None
     if max(sought.doubts) > 0:
         few = _few(len(views), points.counts, settings=settings)
-        first = _solved(*_part(views, points, sought, few), check, settings=settings)
-        bent = _bent(first[2])
+        first = _solve_poses(*_part(views, points, sought, few), check, settings=settings)
+        bent = _bent_lenses(first[2])
         if bent:
             return Poses.of_bent(bent, len(views))
         sought = replace(sought, bends=False)
         growths = _other_lenses(first[2], sought, settings=settings)
         solved = first if len(few) == len(views) and (growths == 1).all() else None
     seen = [view.through(growth) for view, growth in zip(views, growths, strict=True)]
-    found, agreed, adjusted = solved or _solved(seen, points, sought, check, settings=settings)
+    found, agreed, adjusted = solved or _solve_poses(seen, points, sought, check, settings=settings)
     if (growths != 1).any() and (adjusted is None or None in adjusted.lenses):  # all of them tell it no more
         return _together(
             views, points, replace(sought, doubts=(0.0,) * len(sought.doubts)), check, settings=settings
@@ -171,13 +173,13 @@ def _together(
     return _of_adjusted(adjusted, seen, found.missing, settings=settings)
 
 
-def _bent(adjusted: Adjusted | None) -> tuple[FoundFocal | None, ...]:
+def _bent_lenses(adjusted: Adjusted | None) -> tuple[FoundFocal | None, ...]:
     """All lenses, where one of them bends lines."""
     some = adjusted is not None and any(lens is not None and lens.bend for lens in adjusted.lenses)
     return adjusted.lenses if some and adjusted is not None else ()
 
 
-def _solved(
+def _solve_poses(
     views: list[PoseInput],
     points: KeyPoints,
     sought: Sought,
@@ -187,7 +189,7 @@ def _solved(
     """Poses by pairs, the matches that agree with them, and what all say together."""
     edges = _edges(views, points, settings=settings)
     pairs, agreed = _pair_poses(views, edges, check, settings=settings)
-    found = placed(len(views), pairs, settings.graph)
+    found = place_views(len(views), pairs, settings.graph)
     agreed = {edge: agreed[edge] for edge in found.kept}
     return found, agreed, adjusted_photos(views, points, found, agreed, sought, check, settings.adjustment)
 
@@ -318,7 +320,7 @@ def _pair_poses(
     return pairs, {edge: agreed[edge] for edge in pairs}
 
 
-def _agreed(
+def _agreeing_matches(
     view_i: PoseInput, view_j: PoseInput, matches: Matches, relative: np.ndarray, settings: Pairing = PAIRING
 ) -> Matches:
     """Matches that a known relative pose allows; dense ones as well where few do."""

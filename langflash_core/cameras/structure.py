@@ -15,8 +15,8 @@ from langflash_core.base.keeping import MATCHES
 from langflash_core.base.running import Run
 from langflash_core.cameras.adjustment import Sought
 from langflash_core.cameras.alignment import Correction
-from langflash_core.cameras.inputs import PoseInput, grown
-from langflash_core.cameras.keypoints import KeyPoints, decoded, match_photos, match_sources
+from langflash_core.cameras.inputs import PoseInput, scale_focal
+from langflash_core.cameras.keypoints import KeyPoints, decode_grey, match_photos, match_sources
 from langflash_core.cameras.poses import Poses, estimate_poses, on_other_maps
 from langflash_core.geometry.cameras import rays
 from langflash_core.rig.rig import DepthMaps, Rig
@@ -37,7 +37,9 @@ def find_poses(
         InputError: the photos do not fit the poses that are given.
     """
     inputs = _pose_inputs(Ks, views.size, prior, local)
-    return estimate_poses(inputs, _key_points(views, run), run.check, _known(views), _sought(views))
+    return estimate_poses(
+        inputs, _key_points(views, run), run.check, _known_poses(views), _sought_lenses(views)
+    )
 
 
 def is_other_lens(poses: Poses) -> bool:
@@ -60,7 +62,7 @@ def found_lenses(Ks: Float[Tensor, "V 3 3"], poses: Poses) -> Float[Tensor, "V 3
     """Intrinsics of the lenses that were found."""
     if poses.adjusted is None or (poses.growths == 1).all():
         return Ks
-    return torch.from_numpy(grown(Ks.double().cpu().numpy(), poses.growths)).to(Ks)
+    return torch.from_numpy(scale_focal(Ks.double().cpu().numpy(), poses.growths)).to(Ks)
 
 
 def placed_rig(
@@ -72,7 +74,7 @@ def placed_rig(
         prior: of one scene (B = 1).
     """
     corrected = [
-        _corrected(own, K, correction) + math.log(scale)
+        _correct_depths(own, K, correction) + math.log(scale)
         for own, K, scale, correction in zip(
             prior.log_depths[0], Ks, poses.depth_scales, poses.corrections, strict=True
         )
@@ -84,7 +86,7 @@ def placed_rig(
 def grey_photos(views: Views) -> list[UInt8[np.ndarray, "_ _"]]:
     """The largest version of the photos at hand, (h, w) uint8 each."""
     if views.sources:
-        return [decoded(source) for source in views.sources]
+        return [decode_grey(source) for source in views.sources]
     photos = (views.images.movedim(1, -1).cpu().numpy() * 255).round().astype(np.uint8)  # (V, H, W, 3)
     return [cv2.cvtColor(rgb, cv2.COLOR_RGB2GRAY) for rgb in photos]
 
@@ -104,19 +106,19 @@ def _key_points(views: Views, run: Run) -> KeyPoints:
     return KeyPoints.of(run.kept(MATCHES, lambda: match_sources(views.sources, run.check).arrays()))
 
 
-def _known(views: Views) -> Float[np.ndarray, "V 4 4"] | None:
+def _known_poses(views: Views) -> Float[np.ndarray, "V 4 4"] | None:
     """Poses that were given, float64, world = view 0."""
     return None if views.viewmats is None else views.viewmats.double().cpu().numpy()
 
 
-def _sought(views: Views) -> Sought | None:
+def _sought_lenses(views: Views) -> Sought | None:
     """Lenses that are not given."""
     if views.lenses is None:
         return None
     return Sought(views.lenses.of, views.lenses.doubts, not views.lenses.straight)
 
 
-def _corrected(log_depths: Tensor, K: Tensor, correction: Correction) -> Tensor:
+def _correct_depths(log_depths: Tensor, K: Tensor, correction: Correction) -> Tensor:
     """Log depths (H, W) straightened by the matches."""
     height, width = log_depths.shape
     x = rays(K, width, height)[..., :2].cpu().numpy()

@@ -46,11 +46,11 @@ class Tracks:
         return Tracks(numbers[self.points[rows]], *parts), rows, np.flatnonzero(stays)
 
 
-def thinned(tracks: Tracks, most: int) -> Tracks:
+def thin_tracks(tracks: Tracks, most: int) -> Tracks:
     """Points that most views saw, so many that each view has `most` observations, or all of its own."""
     if len(tracks) == 0:
         return tracks
-    tracks = tracks.subset(_spread(tracks))[0]
+    tracks = tracks.subset(_spread_observations(tracks))[0]
     lengths = np.bincount(tracks.points)
     ends = np.cumsum(lengths)
     kept, seen = np.zeros(len(lengths), bool), np.zeros(int(tracks.views.max()) + 1, int)
@@ -62,7 +62,7 @@ def thinned(tracks: Tracks, most: int) -> Tracks:
     return tracks.subset(kept[tracks.points])[0]
 
 
-def _spread(tracks: Tracks) -> np.ndarray:
+def _spread_observations(tracks: Tracks) -> np.ndarray:
     """Of each point the observations (M,) bool that stay: all of `BUNDLE.longest` and fewer; of more so many,
     evenly, the first and the last of them too. A point that a hundred photos saw is known from a part of
     them."""
@@ -78,7 +78,7 @@ def no_tracks() -> Tracks:
     return Tracks(np.zeros(0, int), np.zeros(0, int), np.zeros((0, 2)), np.zeros(0))
 
 
-def joined(
+def join_matches(
     positions: Sequence[Float[np.ndarray, "_ 2"]],
     pairs: Mapping[tuple[int, int], Int[np.ndarray, "_ 2"]],
     sigmas: Sequence[float],

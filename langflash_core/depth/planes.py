@@ -20,12 +20,12 @@ from torch.nn import functional as F
 from langflash_core.rig.settings import FLATTENING, Flattening
 
 
-def flattened(
+def flatten_ripples(
     log_depths: Float[Tensor, "V H W"], log_errors: Float[Tensor, "V H W"], settings: Flattening = FLATTENING
 ) -> Float[Tensor, "V H W"]:
     """Log depths (V, H, W) without ripples; `log_errors` (V, H, W), what is expected of them, stays."""
     size = (log_depths.shape[-2], log_depths.shape[-1])
-    inverse, errors = _halved((-log_depths).exp()), _halved(log_errors.exp())
+    inverse, errors = _halve_size((-log_depths).exp()), _halve_size(log_errors.exp())
     inverse = inverse / inverse.mean((2, 3), keepdim=True)
     ripples = (settings.share * errors).clamp(*settings.range)
     flat = inverse
@@ -59,7 +59,7 @@ def fitted_planes(
     return mean + slope_x * (x - mean_x) + slope_y * (y - mean_y), left.clamp_min(0) / mean**2
 
 
-def _halved(maps: Tensor) -> Tensor:
+def _halve_size(maps: Tensor) -> Tensor:
     """(V, H, W) -> (V, 1, h, w), float64, means of two by two: ripples are slower, and sums eat digits."""
     return F.avg_pool2d(maps[:, None].double(), 2, ceil_mode=True)
 

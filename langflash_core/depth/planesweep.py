@@ -22,7 +22,7 @@ import torch
 from jaxtyping import Bool, Float, UInt8
 from torch import Tensor
 
-from langflash_core.depth.registration import resized, smooth
+from langflash_core.depth.registration import resize_photo, smooth
 from langflash_core.geometry.cameras import invert_rigid, unproject
 from langflash_core.rig.neighbours import Neighbours
 from langflash_core.rig.projected import project_points
@@ -40,7 +40,7 @@ class _Found:
     confirmed: Bool[np.ndarray, "H W"]
 
 
-def searched(
+def sweep_planes(
     rig: Rig,
     photos: Sequence[UInt8[np.ndarray, "_ _"]],
     neighbours: Neighbours,
@@ -56,12 +56,12 @@ def searched(
         check: called before each view is looked at; what it raises ends the work.
     """
     maps = rig.log_depths.cpu()
-    greys = [resized(photo, rig.size) for photo in photos]
+    greys = [resize_photo(photo, rig.size) for photo in photos]
     scene = _Scene(greys, [own.numpy() for own in maps], rig.viewmats.cpu().double(), rig.Ks.cpu().double())
     found = []
     for view, others in enumerate(neighbours):
         check()
-        found.append(_swept(scene, view, others, settings=settings))
+        found.append(_sweep_view(scene, view, others, settings=settings))
     changed = [
         own + _carried_over(scene, view, found, of, settings=settings)
         for view, (own, of) in enumerate(zip(maps, neighbours, strict=True))
@@ -122,13 +122,17 @@ def _mean(values: np.ndarray, settings: PlaneSweep = PLANE_SWEEP) -> np.ndarray:
     return cv2.blur(values, (2 * settings.reach + 1,) * 2)
 
 
-def _swept(scene: _Scene, view: int, others: Sequence[int], settings: PlaneSweep = PLANE_SWEEP) -> _Found:
+def _sweep_view(
+    scene: _Scene, view: int, others: Sequence[int], settings: PlaneSweep = PLANE_SWEEP
+) -> _Found:
     """What the neighbours say of one view."""
     if len(others) < settings.votes:
         nothing = np.zeros(scene.size, bool)
         return _Found(scene.log_depths[view], nothing, nothing)
     windows, own = _Windows(scene.greys[view], settings), scene.log_depths[view]
-    now = _best([windows.alike(_brought(scene, view, other, own), settings=settings) for other in others])
+    now = _best(
+        [windows.alike(_warp_neighbour(scene, view, other, own), settings=settings) for other in others]
+    )
     inverse = _planes(own, settings=settings)
     volume = [
         _best([windows.alike(p, settings=settings) for p in _on_plane(scene, view, others, r)])
@@ -185,7 +189,7 @@ def _peaks(
     return inverse[best] + shift * (inverse[1] - inverse[0])
 
 
-def _brought(scene: _Scene, view: int, other: int, log_depths: np.ndarray) -> UInt8[np.ndarray, "H W"]:
+def _warp_neighbour(scene: _Scene, view: int, other: int, log_depths: np.ndarray) -> UInt8[np.ndarray, "H W"]:
     """A neighbour's picture as the view sees it, by these depths; 0 outside."""
     x, y, _ = scene.seen(view, other, log_depths)
     return cv2.remap(scene.greys[other], x - 0.5, y - 0.5, cv2.INTER_LINEAR, borderMode=cv2.BORDER_CONSTANT)
@@ -212,7 +216,7 @@ def _on_plane(scene: _Scene, view: int, others: Sequence[int], inverse: float) -
     return brought
 
 
-def _agreed(
+def _confirmed_pixels(
     scene: _Scene,
     view: int,
     found: Sequence[_Found],
@@ -243,7 +247,7 @@ def _carried_over(
     """The correction (H, W) of a map: what is found, 0 where the map is confirmed, between them as the
     photo's edges have it."""
     own, sure = scene.log_depths[view], 1 / (settings.error**2 * settings.smoothing.one_shift)
-    there = _agreed(scene, view, found, others, settings=settings)
+    there = _confirmed_pixels(scene, view, found, others, settings=settings)
     if not there.any():
         return torch.zeros(own.shape)
     change = np.where(there, found[view].log_depths - own, 0.0)

@@ -85,7 +85,7 @@ class _Matches:
     sure: np.ndarray
 
 
-def registered(
+def register_depths(
     rig: Rig,
     photos: Sequence[UInt8[np.ndarray, "_ _"]],
     neighbours: Neighbours | None = None,
@@ -108,7 +108,7 @@ def registered(
     )
     if min(height, width) < settings.smallest:
         return rig
-    guides = [resized(photo, cells).astype(np.float32) for photo in photos]
+    guides = [resize_photo(photo, cells).astype(np.float32) for photo in photos]
     pictures = _Pictures.of(photos, (height, width), rig.Ks, cells, settings)
 
     def corrected(view: int) -> Tensor:
@@ -120,7 +120,7 @@ def registered(
             for other in others[:most]:
                 check()
                 pose = (rig.viewmats[other] @ invert_rigid(rig.viewmats[view])).cpu()
-                change, counts = pictures.compared(view, other, depths, known, pose, settings=settings)
+                change, counts = pictures.compare_views(view, other, depths, known, pose, settings=settings)
                 target += _cells(counts * change, cells)
                 weight += _cells(counts, cells)
             own = own + smooth(target, weight, own, guides[view], settings=settings)
@@ -147,10 +147,10 @@ class _Pictures:
     ) -> "_Pictures":
         """Ks: pixels of maps of so many cells."""
         ratio = torch.tensor([size[1] / cells[1], size[0] / cells[0], 1.0])
-        grey = lru_cache(settings.at_hand)(lambda view: resized(photos[view], size))
+        grey = lru_cache(settings.at_hand)(lambda view: resize_photo(photos[view], size))
         return _Pictures(grey, size, Ks.cpu() * ratio[:, None])
 
-    def compared(
+    def compare_views(
         self,
         view: int,
         other: int,
@@ -162,12 +162,12 @@ class _Pictures:
         """Changes of log depth (h, w) that another photo asks for, and what each counts; depths: log, (h,
         w)."""
         greys, Ks = (self.grey(view), self.grey(other)), (self.Ks[view], self.Ks[other])
-        matches = _matched(depths, *greys, *Ks, pose, known, settings=settings)
-        change, moved = _triangulated(depths, matches, *Ks, pose, known, settings=settings)
+        matches = _match_flow(depths, *greys, *Ks, pose, known, settings=settings)
+        change, moved = _triangulate_matches(depths, matches, *Ks, pose, known, settings=settings)
         return change, torch.from_numpy(matches.sure) * moved / (settings.flow_error**2 * settings.one_shift)
 
 
-def resized(photo: UInt8[np.ndarray, "h w"], size: tuple[int, int]) -> UInt8[np.ndarray, "H W"]:
+def resize_photo(photo: UInt8[np.ndarray, "h w"], size: tuple[int, int]) -> UInt8[np.ndarray, "H W"]:
     """A photo at `size` = (H, W)."""
     if photo.shape == size:
         return photo
@@ -179,7 +179,7 @@ def _cells(values: Tensor, size: tuple[int, int]) -> Tensor:
     return F.adaptive_avg_pool2d(values[None, None], size)[0, 0]
 
 
-def _matched(
+def _match_flow(
     log_depths: Tensor,
     grey: np.ndarray,
     other: np.ndarray,
@@ -221,7 +221,7 @@ def _looked_up(
     return cv2.remap(values, columns, rows, cv2.INTER_LINEAR, borderMode=border)
 
 
-def _triangulated(
+def _triangulate_matches(
     log_depths: Tensor,
     matches: _Matches,
     K: Tensor,

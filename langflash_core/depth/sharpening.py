@@ -36,7 +36,7 @@ class _Parts:
         return (self.squares - self.means**2).clamp_min(0).sqrt()
 
 
-def sharpened(
+def sharpen_depths(
     log_depths: Float[Tensor, "V H W"], images: Float[Tensor, "V 3 H W"], settings: Sharpening = SHARPENING
 ) -> Float[Tensor, "V H W"]:
     """Log depths (V, H, W) whose edges are where those of the images (V, 3, H, W) in [0, 1] are.
@@ -48,13 +48,13 @@ def sharpened(
     depths = F.pad(log_depths[:, None], margin, mode="replicate")
     flat = F.pad(_flatness(log_depths, settings=settings)[:, None], margin, mode="replicate")
     middle = (_farthest(depths, settings=settings) - _farthest(-depths, settings=settings))[:, 0] / 2
-    first = _parted(depths, flat, middle, places, settings=settings)
+    first = _part_depths(depths, flat, middle, places, settings=settings)
     middle = first.means.mean(0)
     colours = _colours(images, settings=settings)
     blurred = F.pad(F.avg_pool2d(F.pad(colours, (1,) * 4, mode="replicate"), 3, 1), margin, mode="replicate")
     plain, alike = (
-        _parted(depths, flat, middle, places, settings=settings),
-        _parted(depths, flat, middle, places, colours, blurred, settings=settings),
+        _part_depths(depths, flat, middle, places, settings=settings),
+        _part_depths(depths, flat, middle, places, colours, blurred, settings=settings),
     )
     gap = plain.means[1] - plain.means[0]
     within = ((plain.weights * plain.spreads**2).sum(0) / plain.weights.sum(0)).sqrt()
@@ -70,7 +70,7 @@ def sharpened(
         + settings.where * ((log_depths - middle) / gap.clamp_min(1e-6) * 2).clamp(-1, 1)
     )
     vote = F.avg_pool2d(F.pad(vote[:, None], (1,) * 4, mode="replicate"), 3, 1)[:, 0]
-    return torch.where(two, _taken(log_depths, vote > 0, plain, alike, settings=settings), log_depths)
+    return torch.where(two, _take_part(log_depths, vote > 0, plain, alike, settings=settings), log_depths)
 
 
 def _farthest(depths: Tensor, settings: Sharpening = SHARPENING) -> Tensor:
@@ -79,7 +79,7 @@ def _farthest(depths: Tensor, settings: Sharpening = SHARPENING) -> Tensor:
     return F.max_pool2d(F.max_pool2d(depths, (side, 1), 1), (1, side), 1)
 
 
-def _taken(
+def _take_part(
     log_depths: Tensor, far: Tensor, plain: _Parts, alike: _Parts, settings: Sharpening = SHARPENING
 ) -> Tensor:
     """The depth of the part that a pixel belongs to; its own where that lies within the part."""
@@ -114,7 +114,7 @@ def _colours(images: Tensor, settings: Sharpening = SHARPENING) -> Tensor:
     return torch.cat((light, settings.chroma * (images - light)), 1)
 
 
-def _parted(
+def _part_depths(
     depths: Tensor,
     flat: Tensor,
     middle: Tensor,

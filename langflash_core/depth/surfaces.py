@@ -12,10 +12,10 @@ from torch import Tensor
 from langflash_core.base.many import in_groups
 from langflash_core.base.running import Run
 from langflash_core.cameras.structure import grey_photos
-from langflash_core.depth.planes import flattened
-from langflash_core.depth.planesweep import searched
-from langflash_core.depth.registration import registered
-from langflash_core.depth.sharpening import sharpened
+from langflash_core.depth.planes import flatten_ripples
+from langflash_core.depth.planesweep import sweep_planes
+from langflash_core.depth.registration import register_depths
+from langflash_core.depth.sharpening import sharpen_depths
 from langflash_core.rig.neighbours import source_views
 from langflash_core.rig.rig import Rig
 from langflash_core.rig.settings import (
@@ -63,15 +63,15 @@ def one_surface(
     if len(placed) < 2:
         return rig
     log_depths, greys = rig.log_depths.clone(), grey_photos(views)
-    settled = _settled(rig.some(placed), [greys[view] for view in placed], run, settings)
+    settled = _refine_depths(rig.some(placed), [greys[view] for view in placed], run, settings)
     log_depths[placed] = settled.log_depths
     return rig.with_logs(log_depths)
 
 
-def _settled(rig: Rig, greys: Sequence[np.ndarray], run: Run, settings: Surfaces) -> Rig:
+def _refine_depths(rig: Rig, greys: Sequence[np.ndarray], run: Run, settings: Surfaces) -> Rig:
     """Photos whose places are known."""
     near = source_views(rig, settings=settings.choice)
-    rig = searched(rig, greys, near, run.check, settings.plane_sweep)
+    rig = sweep_planes(rig, greys, near, run.check, settings.plane_sweep)
     rig = sharpen(rig, settings.sharpening)
     told = run.counted("refinement", "photo", range(len(rig)), _SWEPT)
 
@@ -80,19 +80,21 @@ def _settled(rig: Rig, greys: Sequence[np.ndarray], run: Run, settings: Surfaces
         found = run.kept(f"depth-{view}", lambda: {"log_depths": make().cpu().numpy()})
         return torch.from_numpy(np.array(found["log_depths"])).to(rig.depths)
 
-    rig = registered(rig, greys, near, run.check, each, settings.registration)
+    rig = register_depths(rig, greys, near, run.check, each, settings.registration)
     return flatten(rig, settings.flattening)
 
 
 def sharpen(rig: Rig, settings: Sharpening = SHARPENING) -> Rig:
     """Edges of depth where the photos have them."""
     assert rig.photos is not None, "edges are the photos'"
-    return rig.with_logs(one_by_one(partial(sharpened, settings=settings), rig.log_depths, rig.photos))
+    return rig.with_logs(one_by_one(partial(sharpen_depths, settings=settings), rig.log_depths, rig.photos))
 
 
 def flatten(rig: Rig, settings: Flattening = FLATTENING) -> Rig:
     """What is flat within its own uncertainty is flat."""
-    return rig.with_logs(in_groups(partial(flattened, settings=settings), rig.log_depths, rig.log_errors))
+    return rig.with_logs(
+        in_groups(partial(flatten_ripples, settings=settings), rig.log_depths, rig.log_errors)
+    )
 
 
 def one_by_one(work: Callable[..., Tensor], *of_views: Tensor) -> Tensor:

@@ -4,11 +4,11 @@ import os
 from pathlib import Path
 
 from langflash_core.base.formats import AXES, kind_of
-from langflash_core.base.outputs import OUTPUTS, READERS, loaded
+from langflash_core.base.outputs import OUTPUTS, READERS, import_reference
 from langflash_core.errors import InputError, LangFlashError, OutputError, SceneFileError
 from langflash_core.types import Frame, QueryResult, Scene
 
-__all__ = ["READERS", "WRITERS", "export", "opened", "read"]
+__all__ = ["READERS", "WRITERS", "export", "open_scene", "read"]
 
 _SUBJECTS = {
     "of_scene": (Scene, "a scene"),
@@ -54,10 +54,10 @@ def export(
             f"cannot write {path.name}: the suffix {suffix or '(none)'} is unknown; use {known}"
         )
     if not isinstance(subject, Frame | QueryResult):
-        subject = opened(subject)
+        subject = open_scene(subject)
     field = next(field for field, (kind, _) in _SUBJECTS.items() if isinstance(subject, kind))
     if field in writers:
-        return loaded(writers[field])(subject, path, **more)
+        return import_reference(writers[field])(subject, path, **more)
     holds = " or ".join(_SUBJECTS[field][1] for field in _SUBJECTS if field in writers)
     fitting = ", ".join(sorted(ending for ending, known in WRITERS.items() if field in known))
     raise OutputError(f"cannot write {path.name}: a {suffix} file holds {holds}; use {fitting}")
@@ -82,14 +82,14 @@ def read(path: Path | str, *, axes: str | None = None) -> Scene:
         known = ", ".join(sorted(READERS))
         raise SceneFileError(f"{path.name} is not a scene this program reads; name a file ending in {known}")
     try:
-        return loaded(reader)(path, **more)
+        return import_reference(reader)(path, **more)
     except FileNotFoundError as error:
         raise SceneFileError(f"scene {path} does not exist; check the path") from error
     except OSError as error:
         raise SceneFileError(f"{path} cannot be read ({error.strerror}); check its permissions") from error
 
 
-def opened(scene: Scene | Path | str) -> Scene:
+def open_scene(scene: Scene | Path | str) -> Scene:
     """A scene as it is, or read from the path that is given instead.
 
     Raises:

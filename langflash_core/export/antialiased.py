@@ -43,7 +43,7 @@ def filter_of(names: tuple[str, ...] | None) -> str | None:
     return next((name for name in names or () if name.lower() == _FILTER), None)
 
 
-def filtered(rows: Rows, radii: np.ndarray) -> Rows:
+def apply_filter(rows: Rows, radii: np.ndarray) -> Rows:
     """Stored rows as Mip-Splatting draws them: s'^2 = s^2 + f^2, o' = o prod(s / s'), of each Gaussian.
 
     Args:

@@ -166,10 +166,13 @@ def write_colmap(scene: Scene, path: Path) -> None:
     for view, (name, (width, height)) in enumerate(zip(names, sizes, strict=True)):
         K = scene.camera(view, width, height).K.double()
         numbers = (K[0, 0], K[1, 1], K[0, 2], K[1, 2])
-        lenses.append(f"{view + 1} PINHOLE {width} {height} {_told(numbers)}")
+        lenses.append(f"{view + 1} PINHOLE {width} {height} {_format_numbers(numbers)}")
         viewmat = scene.viewmats[view].double().cpu()
         quat = matrices_to_quats(viewmat[:3, :3])
-        places += [f"{view + 1} {_told(quat)} {_told(viewmat[:3, 3])} {view + 1} {name}", ""]
+        places += [
+            f"{view + 1} {_format_numbers(quat)} {_format_numbers(viewmat[:3, 3])} {view + 1} {name}",
+            "",
+        ]
     for name, lines in (
         ("points3D.txt", ["# POINT3D_ID, X, Y, Z, R, G, B, ERROR, TRACK[]", *_points(scene)]),
         ("images.txt", places),
@@ -260,12 +263,12 @@ def _points(scene: Scene) -> list[str]:
     colours = (0.5 + SH_C0 * gaussians.sh[rows, 0]).nan_to_num(0.5).clamp(0, 1) * 255
     places, shades = gaussians.means[rows].tolist(), colours.round().int().tolist()
     return [
-        f"{number} {_told(place)} {' '.join(map(str, shade))} 0"
+        f"{number} {_format_numbers(place)} {' '.join(map(str, shade))} 0"
         for number, (place, shade) in enumerate(zip(places, shades, strict=True), start=1)
     ]
 
 
-def _told(numbers) -> str:
+def _format_numbers(numbers) -> str:
     return " ".join(f"{float(number):.10g}" for number in numbers)
 
 

@@ -68,7 +68,7 @@ def read_model(path: Path) -> list[Seen]:
     lenses = {}
     for line in text_lines(folder / "cameras.txt"):
         if line.strip():
-            words = _split(line, 4 + _COUNTS.get(_model_of(line), 0))
+            words = _split_line(line, 4 + _COUNTS.get(_model_of(line), 0))
             lenses[words[0]] = _lens(words[0], words[1], words[2:4], words[4:])
     return list(_photos(text_lines(folder / "images.txt"), lenses))
 
@@ -108,7 +108,7 @@ def _model_of(line: str) -> str:
     return [*re.split(r"[,\s]+", line.strip(), maxsplit=2), ""][1]
 
 
-def _split(line: str, count: int) -> list[str]:
+def _split_line(line: str, count: int) -> list[str]:
     """A line's words, its numbers with decimal points: commas part words, or are decimal where blanks do.
 
     Args:
@@ -139,7 +139,7 @@ def _photos(lines: list[str], lenses: dict[str, Lens]) -> Iterator[Seen]:
         if after_photo and _is_points(line, lenses):
             after_photo = False
             continue
-        words = _split(line, COLMAP_TEXT.words)
+        words = _split_line(line, COLMAP_TEXT.words)
         if len(words) != COLMAP_TEXT.words + 1:
             raise ValueError(f"a line of images.txt has {len(words)} words, not {COLMAP_TEXT.words + 1}")
         numbers = [float(word) for word in words[1:8]]
@@ -150,7 +150,7 @@ def _photos(lines: list[str], lenses: dict[str, Lens]) -> Iterator[Seen]:
 def _is_points(line: str, lenses: dict[str, Lens]) -> bool:
     """Whether a line behind one of a photo is its points: numbers alone, and not those of a photo whose name
     is a number. Of long lines the beginning and the end are looked at."""
-    words = _split(line, COLMAP_TEXT.words)
+    words = _split_line(line, COLMAP_TEXT.words)
     behind = [*words[COLMAP_TEXT.words :], ""][0]
     try:
         numbers = [

@@ -82,7 +82,7 @@ def write_compressed_ply(scene: Scene, path: Path) -> None:
         OutputError: there is nothing to write, or the path cannot be written.
     """
     check_some(scene.gaussians, path)
-    write_atomically(path, _encoded(scene.gaussians, ply_comments(scene)))
+    write_atomically(path, _encode(scene.gaussians, ply_comments(scene)))
 
 
 def _check_elements(places: dict[str, tuple[int, int, np.dtype]], name: str) -> int:
@@ -156,7 +156,7 @@ def _fields(words: np.ndarray, shifts: tuple[int, ...], bits: tuple[int, ...]) -
     return ((words[:, None].astype(np.uint32) >> np.array(shifts, np.uint32)) & tops) / tops
 
 
-def _encoded(gaussians: Gaussians, comments: list[str]) -> Iterator[bytes]:
+def _encode(gaussians: Gaussians, comments: list[str]) -> Iterator[bytes]:
     num_bases = min(gaussians.sh.shape[1], (MAX_SHOWN_DEGREE + 1) ** 2)
     count, num_rest = len(gaussians), 3 * (num_bases - 1)
     order = morton_order(gaussians.means.detach().cpu().double().numpy())
@@ -164,7 +164,7 @@ def _encoded(gaussians: Gaussians, comments: list[str]) -> Iterator[bytes]:
     for part in parts(gaussians.map(lambda values: values.detach().cpu()[order])):
         for first in range(0, len(part.means), CHUNKS.size):
             chunk = Rows(*(values[first : first + CHUNKS.size] for values in part.all()))
-            low_high, packed = _packed(chunk)
+            low_high, packed = _pack_chunk(chunk)
             bounds.append(low_high)
             words.append(packed)
         flat = part.sh[:, 1:num_bases].transpose(0, 2, 1).reshape(len(part.means), num_rest)
@@ -179,7 +179,7 @@ def _encoded(gaussians: Gaussians, comments: list[str]) -> Iterator[bytes]:
     yield from (*bounds, *words, *rest)
 
 
-def _packed(rows: Rows) -> tuple[bytes, bytes]:
+def _pack_chunk(rows: Rows) -> tuple[bytes, bytes]:
     """Bounds and words of one chunk."""
     scales = np.clip(np.log(rows.scales), -CHUNKS.widest, CHUNKS.widest)
     means, scales, colours = rows.means, scales, 0.5 + SH_C0 * rows.sh[:, 0]

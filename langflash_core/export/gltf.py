@@ -26,7 +26,7 @@ from langflash_core.errors import SceneFileError
 from langflash_core.export.colours import encoding_of, linear, with_srgb_colours
 from langflash_core.export.gltf_document import REMEDY, TYPES, WIDTHS, Document, extensions, glb_head
 from langflash_core.export.language import packed_language, speaks, with_language
-from langflash_core.export.packing import check_some, placed, told, turned
+from langflash_core.export.packing import check_some, error_line, place_rows, transform_rows
 from langflash_core.export.settings import GLTF_CODES, STORED
 from langflash_core.export.stored import Gathering, Rows, parts, to_scene
 from langflash_core.geometry.harmonics import MAX_SHOWN_DEGREE, SH_C0
@@ -58,10 +58,10 @@ def read_gltf(path: Path) -> Scene:
         found = _primitives(document)
         if not found:
             raise SceneFileError(f"{path.name} holds no Gaussians (no primitive with {EXTENSION}); {REMEDY}")
-        scene = _gathered(document, found, path.name)
+        scene = _gather_primitives(document, found, path.name)
         return _speaking(scene, document, found, path.name)
     except _DAMAGE as error:
-        raise SceneFileError(f"{path.name} is damaged or no glTF ({told(error)}); {REMEDY}") from error
+        raise SceneFileError(f"{path.name} is damaged or no glTF ({error_line(error)}); {REMEDY}") from error
 
 
 def write_glb(scene: Scene, path: Path) -> None:
@@ -72,7 +72,7 @@ def write_glb(scene: Scene, path: Path) -> None:
     """
     check_some(scene.gaussians, path)
     block = packed_language(scene) if speaks(scene) else b""
-    write_atomically(path, _encoded(scene.gaussians, block))
+    write_atomically(path, _encode(scene.gaussians, block))
 
 
 @dataclass(frozen=True)
@@ -105,7 +105,7 @@ def _primitives(document: Document) -> list[_Splats]:
             if EXTENSION in extensions(primitive):
                 document.check_drawn_once(mesh, node)
                 _check_understood(document, primitive)
-                found.append(_Splats(primitive, matrix, _drawn(document, primitive)))
+                found.append(_Splats(primitive, matrix, _drawn_rows(document, primitive)))
     return found
 
 
@@ -130,7 +130,7 @@ def _check_understood(document: Document, primitive: dict[str, Any]) -> None:
         raise document.refused(f"has Gaussians with {unknown[0][:60]}, which this program does not know")
 
 
-def _drawn(document: Document, primitive: dict[str, Any]) -> np.ndarray | range:
+def _drawn_rows(document: Document, primitive: dict[str, Any]) -> np.ndarray | range:
     """Rows that are drawn: all, or those that the primitive's indices name."""
     count = document.count(primitive["attributes"]["POSITION"])
     if "indices" not in primitive:
@@ -141,7 +141,7 @@ def _drawn(document: Document, primitive: dict[str, Any]) -> np.ndarray | range:
     return indices
 
 
-def _gathered(document: Document, found: list[_Splats], name: str) -> Scene:
+def _gather_primitives(document: Document, found: list[_Splats], name: str) -> Scene:
     """The scene of all primitives."""
     num_bases = max(_num_bases(splats.attributes) for splats in found)
     gathering = Gathering(sum(len(splats.some) for splats in found), num_bases, name)
@@ -151,7 +151,7 @@ def _gathered(document: Document, found: list[_Splats], name: str) -> Scene:
         warnings += [*_oddities(splats, name, logs), *filter(None, [encoding.said])]
         for rows in _rows(document, splats, num_bases, logs):
             srgb = with_srgb_colours(rows) if encoding.linear else rows
-            gathering.add(placed(srgb, splats.matrix, _AXES))
+            gathering.add(place_rows(srgb, splats.matrix, _AXES))
     return to_scene(gathering, name, list(dict.fromkeys(warnings)), logs=False, logits=False)
 
 
@@ -227,18 +227,18 @@ def _rows(document: Document, splats: _Splats, num_bases: int, logs: bool) -> It
         yield Rows(means, quats, np.exp(scales) if logs else scales, opacities, sh)
 
 
-def _encoded(gaussians: Gaussians, block: bytes) -> Iterator[bytes]:
+def _encode(gaussians: Gaussians, block: bytes) -> Iterator[bytes]:
     """The chunks of a .glb; positions need their bounds first, so rows are turned once and kept."""
     num_bases = min(gaussians.sh.shape[1], (MAX_SHOWN_DEGREE + 1) ** 2)
     matrix = axes_matrix(_AXES)
-    rows = [turned(part, matrix) for part in parts(gaussians)]
+    rows = [transform_rows(part, matrix) for part in parts(gaussians)]
     columns: list[tuple[str, str, int]] = [
         ("POSITION", "VEC3", GLTF_CODES.float), ("COLOR_0", "VEC4", GLTF_CODES.ushort),
         (_NAMES["ROTATION"], "VEC4", GLTF_CODES.float),
         (_NAMES["SCALE"], "VEC3", GLTF_CODES.float), (_NAMES["OPACITY"], "SCALAR", GLTF_CODES.float),
         *((name, "VEC3", GLTF_CODES.float) for name in _harmonics(num_bases)),
     ]  # fmt: skip
-    document, length = _described(columns, rows, len(gaussians), len(block))
+    document, length = _describe_document(columns, rows, len(gaussians), len(block))
     padding = b"\0" * (-length % 4)
     yield glb_head(document, length + len(padding))
     for index in range(len(columns)):
@@ -246,7 +246,7 @@ def _encoded(gaussians: Gaussians, block: bytes) -> Iterator[bytes]:
     yield block + padding
 
 
-def _described(
+def _describe_document(
     columns: list[tuple[str, str, int]], rows: list[Rows], count: int, block: int
 ) -> tuple[dict, int]:
     """The JSON, and the bytes of its buffer."""
@@ -279,7 +279,7 @@ def _described(
 
 
 def _column(rows: Rows, index: int) -> bytes:
-    """Bytes of one attribute, in the order of `_encoded`."""
+    """Bytes of one attribute, in the order of `_encode`."""
     if index == 1:
         colours = linear(np.clip(0.5 + SH_C0 * rows.sh[:, 0], 0, 1))
         shown = np.concatenate((colours, rows.opacities[:, None]), 1)

@@ -90,7 +90,7 @@ class Document:
             raise SceneFileError(f"{self._name} is glTF {needed[:20]}, this program reads 2.0; {REMEDY}")
         unknown = [str(name) for name in self.json.get("extensionsRequired", ()) if name not in known]
         if unknown:
-            raise self.refused(f"needs {_listed(unknown)}, which this program does not know")
+            raise self.refused(f"needs {_list_names(unknown)}, which this program does not know")
 
     def refused(self, why: str) -> SceneFileError:
         """The sentence about this file; it is whole, and cannot be read here."""
@@ -155,7 +155,7 @@ class Document:
 
     def count(self, accessor: int) -> int:
         """Rows of an accessor, as many as its bytes have."""
-        return len(self._stored(accessor))
+        return len(self._read_buffer(accessor))
 
     def numbers(self, accessor: int, width: int, some: _Rows) -> np.ndarray:
         """Rows (n, width) float32 of an accessor; normalised integers in [0, 1] or [-1, 1]."""
@@ -166,13 +166,13 @@ class Document:
 
     def rows(self, accessor: int, width: int, some: _Rows) -> np.ndarray:
         """Rows (n, width) of an accessor as they are stored, with those that a sparse one replaces."""
-        stored = self._stored(accessor)
+        stored = self._read_buffer(accessor)
         if stored.shape[1] != width:
             raise ValueError(f"accessor {accessor} is {stored.shape[1]} wide, expected {width}")
         sparse = self.item("accessors", accessor).get("sparse")
-        return stored[some] if sparse is None else self._replaced(stored, sparse, some)
+        return stored[some] if sparse is None else self._replace_sparse(stored, sparse, some)
 
-    def _replaced(self, stored: np.ndarray, sparse: dict[str, Any], some: _Rows) -> np.ndarray:
+    def _replace_sparse(self, stored: np.ndarray, sparse: dict[str, Any], some: _Rows) -> np.ndarray:
         count, (places, values) = sparse["count"], (sparse["indices"], sparse["values"])
         at = self._array(places["bufferView"], places, places["componentType"], 1, count)[:, 0]
         new = self._array(values["bufferView"], values, stored.dtype, stored.shape[1], count)
@@ -182,7 +182,7 @@ class Document:
         found = np.minimum(np.searchsorted(at, asked), count - 1)
         return np.where((at[found] == asked)[:, None], new[found], stored[some])
 
-    def _stored(self, accessor: int) -> np.ndarray:
+    def _read_buffer(self, accessor: int) -> np.ndarray:
         """Rows (count, width) of an accessor's buffer view."""
         described = self.item("accessors", accessor)
         if "bufferView" not in described:
@@ -213,9 +213,9 @@ class Document:
         described = self.item("buffers", index)
         if index not in self._buffers:
             uri, own = described.get("uri"), self._own if index == 0 else None
-            content = own if uri is None else memoryview(self._fetched(uri))
+            content = own if uri is None else memoryview(self._fetch(uri))
             if content is None:
-                names = _listed([*filled_by, *extensions(described)])
+                names = _list_names([*filled_by, *extensions(described)])
                 if names:
                     raise self.refused(f"is compressed ({names}): buffer {index} has no bytes")
                 raise ValueError(f"buffer {index} has no bytes")
@@ -225,7 +225,7 @@ class Document:
             raise ValueError(f"buffer {index} needs {needed:,} bytes, found {len(content):,}")
         return content
 
-    def _fetched(self, uri: str) -> bytes:
+    def _fetch(self, uri: str) -> bytes:
         """What an address names: bytes in it, or a file beside this one; percent-encoded as addresses are.
 
         Raises:
@@ -250,7 +250,7 @@ def extensions(described: dict[str, Any]) -> dict[str, Any]:
     return described.get("extensions", {})
 
 
-def _listed(names: Sequence[str]) -> str:
+def _list_names(names: Sequence[str]) -> str:
     """Names once each, a few, in one line."""
     plain = [" ".join(str(name).split())[:60] for name in dict.fromkeys(names)]
     return ", ".join([*plain[:4], *(["others"] if len(plain) > 4 else [])])

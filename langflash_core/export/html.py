@@ -128,7 +128,7 @@ def write_html(
     scenes = []
     for each in (first, *beside):
         check_some(each.scene.gaussians, path)
-        header, payload = _encoded(each.scene, each.phrases)
+        header, payload = _encode(each.scene, each.phrases)
         scenes.append(({**header, "title": each.title}, payload))
     write_atomically(path, _page(scenes, text_model).encode())
 
@@ -213,12 +213,12 @@ def _constants() -> dict[str, str]:
     }
 
 
-def _encoded(scene: Scene, phrases: Phrases | None) -> tuple[dict, bytes]:
+def _encode(scene: Scene, phrases: Phrases | None) -> tuple[dict, bytes]:
     """Header and columns."""
     origin = invert_rigid(scene.viewmats[0].double())[:3, 3]
     if scene.view_ids is None:  # in no order that says what is near
         scene = scene.rows(torch.from_numpy(morton_order(scene.gaussians.means.double().cpu().numpy())))
-    held, books, columns = _held(scene, origin)
+    held, books, columns = _page_columns(scene, origin)
     header = {
         "format": _FORMAT,
         "version": _VERSION,
@@ -246,7 +246,7 @@ def _encoded(scene: Scene, phrases: Phrases | None) -> tuple[dict, bytes]:
     return header, b"".join(column.packed() for column in columns)
 
 
-def _held(scene: Scene, origin: Tensor) -> tuple[Scene, dict, list[Column]]:
+def _page_columns(scene: Scene, origin: Tensor) -> tuple[Scene, dict, list[Column]]:
     """The scene in the order in which the page holds it; what of the header its Gaussians need, and their
     columns."""
     if not scene.layered or scene.view_ids is None or not bool((scene.view_ids >= 0).any()):

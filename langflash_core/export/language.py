@@ -18,12 +18,12 @@ import torch
 from safetensors import SafetensorError
 
 from langflash_core.base.limits import ATOMS, VIEWS
-from langflash_core.export.packing import told
+from langflash_core.export.packing import error_line
 from langflash_core.scene.checks import check_scene
 from langflash_core.scene.container import in_order
 from langflash_core.scene.fields import to_fields
 from langflash_core.scene.record import from_json, to_json
-from langflash_core.scene.weights import renormalised
+from langflash_core.scene.weights import renormalise
 from langflash_core.types import Gaussians, Scene, Semantics
 
 SIDE_CAR = ".language.safetensors"
@@ -62,9 +62,11 @@ def with_language(scene: Scene, block: bytes, name: str) -> Scene:
         name: what to call the block in the warning.
     """
     try:
-        fields, described = _unpacked(block)
+        fields, described = _unpack(block)
         if described["positions"] != _fingerprint(scene.gaussians):
-            return _warned(scene, f"{name} belongs to other Gaussians than these; they were read without it.")
+            return _add_warning(
+                scene, f"{name} belongs to other Gaussians than these; they were read without it."
+            )
         names = sorted((f for f in fields if f.startswith("photo_")), key=lambda name: (len(name), name))
         photos = tuple(fields[photo].numpy().tobytes() for photo in names)
         for limit, part in ((ATOMS, "dictionary"), (VIEWS, "viewmats")):
@@ -76,7 +78,7 @@ def with_language(scene: Scene, block: bytes, name: str) -> Scene:
             scene,
             semantics=Semantics(
                 weight_ids=fields["weight_ids"].long(),
-                weight_values=renormalised(fields["weight_values"].float()),
+                weight_values=renormalise(fields["weight_values"].float()),
                 dictionary=fields["dictionary"].float(),
                 space=str(described["space"]),
             ),
@@ -92,10 +94,12 @@ def with_language(scene: Scene, block: bytes, name: str) -> Scene:
         check_scene(whole)
         return whole
     except _DAMAGE as error:
-        return _warned(scene, f"{name} is damaged ({told(error)}); the Gaussians were read without it.")
+        return _add_warning(
+            scene, f"{name} is damaged ({error_line(error)}); the Gaussians were read without it."
+        )
 
 
-def _unpacked(block: bytes) -> tuple[dict[str, torch.Tensor], dict]:
+def _unpack(block: bytes) -> tuple[dict[str, torch.Tensor], dict]:
     """Tensors and the header's JSON.
 
     Raises:
@@ -113,5 +117,5 @@ def _fingerprint(gaussians: Gaussians) -> str:
     return hashlib.sha256((means + 0.0).astype("<f4").tobytes()).hexdigest()  # + 0.0: -0 becomes 0
 
 
-def _warned(scene: Scene, sentence: str) -> Scene:
+def _add_warning(scene: Scene, sentence: str) -> Scene:
     return scene.with_record(warnings=(*scene.record.warnings, sentence))

@@ -20,7 +20,7 @@ _NO_ZSTD = "zstd is not installed; pip install 'langflash[formats]'"
 _OTHERS = np.array([[1, 2, 3], [0, 2, 3], [0, 1, 3], [0, 1, 2]])  # entries but the largest, in order
 
 
-def turned(rows: Rows, matrix: torch.Tensor) -> Rows:
+def transform_rows(rows: Rows, matrix: torch.Tensor) -> Rows:
     """Rows of Gaussians moved by x' = M x, M (3, 3) orthogonal; scales and opacities stay as they are."""
     means, quats, sh = (torch.tensor(values) for values in (rows.means, rows.quats, rows.sh))
     moved = (means.double() @ matrix.double().T).float()
@@ -29,7 +29,7 @@ def turned(rows: Rows, matrix: torch.Tensor) -> Rows:
 
 
 @np.errstate(over="ignore", invalid="ignore")  # rows that are not finite stay out
-def placed(rows: Rows, place: np.ndarray, axes: str) -> Rows:
+def place_rows(rows: Rows, place: np.ndarray, axes: str) -> Rows:
     """Rows below a node of another scene graph, in the axes of a `Scene`.
 
     Args:
@@ -47,7 +47,7 @@ def placed(rows: Rows, place: np.ndarray, axes: str) -> Rows:
         raise ValueError("a node stretches its Gaussians unevenly")
     means, scales = ((values * size).astype(np.float32) for values in (rows.means, rows.scales))
     sized = Rows(means, rows.quats, scales, rows.opacities, rows.sh)
-    moved = turned(sized, ours @ torch.from_numpy(linear / size))
+    moved = transform_rows(sized, ours @ torch.from_numpy(linear / size))
     shift = (ours.numpy() @ place[:3, 3]).astype(np.float32)
     return Rows(moved.means + shift, moved.quats, moved.scales, moved.opacities, moved.sh)
 
@@ -79,7 +79,7 @@ def morton_order(means: np.ndarray) -> np.ndarray:
     return np.argsort(cells[:, 0] | cells[:, 1] << 1 | cells[:, 2] << 2, kind="stable")
 
 
-def told(error: BaseException) -> str:
+def error_line(error: BaseException) -> str:
     """What a decoder says, in one short line; some cannot say it in UTF-8."""
     try:
         return " ".join(str(error).split())[:100]
@@ -95,7 +95,7 @@ def check_some(gaussians: Gaussians, path: Path) -> None:
         raise OutputError(f"cannot write {path.name}: the scene holds no Gaussians; keep some of them")
 
 
-def inflated(content: bytes, size: int, name: str, *, wbits: int) -> bytes:
+def inflate(content: bytes, size: int, name: str, *, wbits: int) -> bytes:
     """At most `size` bytes of a deflate or gzip stream; fewer where it ends, whole, earlier.
 
     Args:

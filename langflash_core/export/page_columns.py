@@ -14,7 +14,7 @@ import torch
 from jaxtyping import Bool, Integer
 from torch import Tensor
 
-from langflash_core.export.quantised import quantised
+from langflash_core.export.quantised import quantise
 from langflash_core.export.settings import COLUMNS
 from langflash_core.rig.projected import project_points
 from langflash_core.types import Scene
@@ -43,7 +43,7 @@ class Column:
 def gaussian_columns(scene: Scene, origin: Tensor) -> tuple[dict, list[Column]]:
     """What of the header the Gaussians need, and their columns."""
     around = scene.gaussians.means.double().cpu() - origin.cpu()
-    stored = quantised(scene.gaussians.map(lambda values: values.cpu()), around)
+    stored = quantise(scene.gaussians.map(lambda values: values.cpu()), around)
     columns = [Column("largest", stored.largest), Column("opacity", stored.opacities, differences=True)]
     for axis in range(3):
         columns += [

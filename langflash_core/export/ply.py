@@ -19,7 +19,7 @@ import numpy as np
 from langflash_core.base.files import write_atomically
 from langflash_core.base.records import Shift
 from langflash_core.errors import SceneFileError
-from langflash_core.export.antialiased import filter_of, filtered, ply_comments, ply_model
+from langflash_core.export.antialiased import apply_filter, filter_of, ply_comments, ply_model
 from langflash_core.export.language import packed_language, side_car, speaks, with_language
 from langflash_core.export.ply_numbers import (
     DC,
@@ -89,14 +89,14 @@ def read_ply(path: Path) -> Scene:
         stream.seek(layout.start)
         for first in range(0, layout.count, STORED.rows_at_once):
             rows = np.fromfile(stream, numbers.row, min(STORED.rows_at_once, layout.count - first))
-            gathering.add(_filtered(_columns(rows, num_bases, numbers), rows))
+            gathering.add(_filter_rows(_columns(rows, num_bases, numbers), rows))
     model = ANTIALIASED if filter_of(layout.row.names) else ply_model(path)
-    scene = _activated(gathering, numbers, path.name, layout, model)
+    scene = _activate_rows(gathering, numbers, path.name, layout, model)
     beside = side_car(path)
     return with_language(scene, beside.read_bytes(), beside.name) if beside.is_file() else scene
 
 
-def _activated(gathering: Gathering, numbers: Numbers, name: str, layout: _Layout, model: str) -> Scene:
+def _activate_rows(gathering: Gathering, numbers: Numbers, name: str, layout: _Layout, model: str) -> Scene:
     """The scene of gathered rows. model: as `to_scene` takes it."""
     stored, warnings = gathering.stored(), list(numbers.said)
     known = layout.own or filter_of(layout.row.names) is not None  # whose writers leave nothing to guess
@@ -119,12 +119,12 @@ def write_ply(scene: Scene, path: Path) -> None:
     Raises:
         OutputError: the path cannot be written.
     """
-    write_atomically(path, _encoded(scene.gaussians, scene.record.shift, ply_comments(scene)))
+    write_atomically(path, _encode(scene.gaussians, scene.record.shift, ply_comments(scene)))
     if speaks(scene):
         write_atomically(side_car(path), packed_language(scene))
 
 
-def _encoded(gaussians: Gaussians, shift: Shift | None, comments: list[str]) -> Iterator[bytes]:
+def _encode(gaussians: Gaussians, shift: Shift | None, comments: list[str]) -> Iterator[bytes]:
     num_bases = min(gaussians.sh.shape[1], (MAX_SHOWN_DEGREE + 1) ** 2)
     rest = [f"f_rest_{index}" for index in range(3 * (num_bases - 1))]
     names = (*MEANS, *_NORMALS, *DC, *rest, "opacity", *SCALES, *QUATS)
@@ -278,9 +278,9 @@ def _columns(rows: np.ndarray, num_bases: int, numbers: Numbers) -> Rows:
     return Rows(numbers.means(rows), block(rows, QUATS), numbers.scales(rows), opacities, sh)
 
 
-def _filtered(stored: Rows, rows: np.ndarray) -> Rows:
+def _filter_rows(stored: Rows, rows: np.ndarray) -> Rows:
     name = filter_of(rows.dtype.names)
-    return stored if name is None else filtered(stored, rows[name])
+    return stored if name is None else apply_filter(stored, rows[name])
 
 
 def _looks_activated(opacities: np.ndarray) -> bool:

@@ -14,7 +14,7 @@ from langflash_core.base.colormaps import HeatColours
 from langflash_core.base.files import write_atomically
 from langflash_core.export.colours import heat, label_colours
 from langflash_core.export.settings import PAINTING
-from langflash_core.scene.gaps import filled
+from langflash_core.scene.gaps import fill_gaps
 from langflash_core.types import LUMA, Frame, QueryResult
 
 USUAL = HeatColours()
@@ -32,13 +32,13 @@ def write_rgb(path: Path, rgb: Tensor) -> None:
 
 def rgb_file(rgb: Tensor) -> bytes:
     """What `write_rgb` writes."""
-    return _encoded(Image.fromarray(to_8bit(rgb)))
+    return _encode(Image.fromarray(to_8bit(rgb)))
 
 
 def write_mask(path: Path, mask: Tensor) -> None:
     """A mask (H, W) bool: 255 inside, 0 outside."""
     _check_map("mask", mask)
-    write_atomically(path, _encoded(Image.fromarray(mask.cpu().numpy().astype(np.uint8) * 255)))
+    write_atomically(path, _encode(Image.fromarray(mask.cpu().numpy().astype(np.uint8) * 255)))
 
 
 def write_grey(path: Path, values: Tensor, low: float, high: float) -> None:
@@ -52,7 +52,7 @@ def write_grey(path: Path, values: Tensor, low: float, high: float) -> None:
         raise ValueError(f"low, high: expected low < high, received {low}, {high}")
     share = torch.nan_to_num((values.detach().cpu().double() - low) / (high - low), nan=0.0).clamp(0, 1)
     counts = (share * (2**16 - 1)).round().numpy().astype(np.uint16)
-    write_atomically(path, _encoded(Image.fromarray(counts)))
+    write_atomically(path, _encode(Image.fromarray(counts)))
 
 
 def write_relevance(path: Path, relevance: Tensor, mode: str) -> None:
@@ -134,7 +134,7 @@ def write_labels(path: Path, labels: Tensor, names: Sequence[str]) -> None:
     ]
     legend = json.dumps({"picture": path.name, "labels": entries}, indent=2, ensure_ascii=False)
     write_atomically(path.with_suffix(".json"), legend.encode())
-    write_atomically(path, _encoded(image))
+    write_atomically(path, _encode(image))
 
 
 def label_map(result: QueryResult) -> Tensor:
@@ -164,7 +164,7 @@ def label_picture(result: QueryResult) -> np.ndarray:
     labels = label_map(result).cpu()  # (H, W), 0 is none
     colours = np.concatenate((np.zeros((1, 3)), label_colours(len(result.answers)) / 255))
     frame = result.frame
-    rgb = filled(frame.rgb.detach().cpu().float(), frame.alphas.detach().cpu().float()).clamp(0, 1)
+    rgb = fill_gaps(frame.rgb.detach().cpu().float(), frame.alphas.detach().cpu().float()).clamp(0, 1)
     coloured = (1 - PAINTING.label_opacity) * rgb + PAINTING.label_opacity * torch.from_numpy(
         colours
     ).float()[labels]
@@ -185,7 +185,7 @@ def _check_map(name: str, values: Tensor) -> None:
         raise ValueError(f"{name}: expected (H, W), received {tuple(values.shape)}")
 
 
-def _encoded(image: Image.Image) -> bytes:
+def _encode(image: Image.Image) -> bytes:
     stream = io.BytesIO()
     image.save(stream, "PNG")
     return stream.getvalue()

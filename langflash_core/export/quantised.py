@@ -47,7 +47,7 @@ class Quantised:
     harmonics: Palette | None
 
 
-def quantised(gaussians: Gaussians, means: Tensor | None = None) -> Quantised:
+def quantise(gaussians: Gaussians, means: Tensor | None = None) -> Quantised:
     """Gaussians, at least one, in their own order; harmonics to degree 3.
 
     Args:

@@ -10,7 +10,7 @@ from PIL import Image, ImageDraw, ImageFont
 from langflash_core.export.settings import SHEET
 
 
-def captioned(picture: UInt8[np.ndarray, "H W 3"], text: str) -> UInt8[np.ndarray, "h w 3"]:
+def add_caption(picture: UInt8[np.ndarray, "H W 3"], text: str) -> UInt8[np.ndarray, "h w 3"]:
     """A picture under its caption, on black; what does not fit of the caption ends in dots."""
     height, width = picture.shape[:2]
     cell = Image.new("RGB", (width + 2 * SHEET.gap, height + SHEET.caption + 2 * SHEET.gap))
@@ -32,7 +32,7 @@ def contact_sheet(
     Args:
         columns: None: as many as make the sheet about as wide as high.
     """
-    cells = [captioned(thumbnail(picture), caption) for caption, picture in tiles]
+    cells = [add_caption(thumbnail(picture), caption) for caption, picture in tiles]
     wide = columns or math.ceil(math.sqrt(len(cells) * cells[0].shape[0] / cells[0].shape[1]))
     blank = np.zeros_like(cells[0])
     cells += [blank] * (-len(cells) % wide)

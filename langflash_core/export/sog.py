@@ -28,8 +28,8 @@ from langflash_core.base.formats import SOG_FOLDER
 from langflash_core.base.limits import FILES, GAUSSIANS
 from langflash_core.base.picture_files import opened_picture
 from langflash_core.errors import OutputError, SceneFileError
-from langflash_core.export.packing import check_some, from_smallest_three, morton_order, told
-from langflash_core.export.quantised import Palette, quantised
+from langflash_core.export.packing import check_some, error_line, from_smallest_three, morton_order
+from langflash_core.export.quantised import Palette, quantise
 from langflash_core.export.settings import SOG_LIMITS, STORED
 from langflash_core.export.stored import ANTIALIASED, PLAIN, Gathering, Rows, to_scene
 from langflash_core.types import Scene
@@ -52,14 +52,14 @@ def read_sog(path: Path) -> Scene:
         raise SceneFileError(f"{path.name} is an empty file; {_REMEDY}")
     try:
         if path.name.lower() == SOG_FOLDER:
-            return _read(path.name, lambda name, most: _file(path.parent, name, most))
+            return _read_folder(path.name, lambda name, most: _file(path.parent, name, most))
         with zipfile.ZipFile(path) as archive:
             FILES.check(len(archive.infolist()), path.name, SceneFileError)
-            return _read(path.name, lambda name, most: _entry(archive, name, most))
+            return _read_folder(path.name, lambda name, most: _entry(archive, name, most))
     except Image.DecompressionBombError as error:
         raise SceneFileError(f"{path.name} has a picture of too many pixels; {_REMEDY}") from error
     except _DAMAGE as error:
-        raise SceneFileError(f"{path.name} is damaged or no SOG ({told(error)}); {_REMEDY}") from error
+        raise SceneFileError(f"{path.name} is damaged or no SOG ({error_line(error)}); {_REMEDY}") from error
 
 
 def write_sog(scene: Scene, path: Path) -> None:
@@ -71,7 +71,7 @@ def write_sog(scene: Scene, path: Path) -> None:
     check_some(scene.gaussians, path)
     if len(scene.gaussians) > SOG_LIMITS.largest_side**2 // 2:
         raise OutputError(f"cannot write {path.name}: too many Gaussians for a SOG; name a .ply")
-    files = _encoded(scene)
+    files = _encode(scene)
     if path.name.lower() == SOG_FOLDER:
         make_folder(path.parent)
         meta = files.pop(SOG_FOLDER)  # last, so that it never names what is not there
@@ -108,7 +108,7 @@ def _at_most(stream, most: int, name: str) -> bytes:
     return content
 
 
-def _read(name: str, open_file: _Opener) -> Scene:
+def _read_folder(name: str, open_file: _Opener) -> Scene:
     """Raises:
     SceneFileError: another version. Any of `_DAMAGE`: something does not fit.
     """
@@ -191,10 +191,10 @@ def _quats(stored: np.ndarray) -> np.ndarray:
     return quats
 
 
-def _encoded(scene: Scene) -> dict[str, bytes]:
+def _encode(scene: Scene) -> dict[str, bytes]:
     """Files by name."""
     order = morton_order(scene.gaussians.means.detach().cpu().double().numpy())
-    stored = quantised(scene.gaussians.rows(torch.from_numpy(order)))
+    stored = quantise(scene.gaussians.rows(torch.from_numpy(order)))
     files = {
         "means_l.webp": _picture(stored.steps & 255),
         "means_u.webp": _picture(stored.steps >> 8),

@@ -60,10 +60,10 @@ def write_splat(scene: Scene, path: Path) -> None:
     Raises:
         OutputError: the path cannot be written.
     """
-    write_atomically(path, _encoded(scene.gaussians))
+    write_atomically(path, _encode(scene.gaussians))
 
 
-def _encoded(gaussians: Gaussians) -> Iterator[bytes]:
+def _encode(gaussians: Gaussians) -> Iterator[bytes]:
     for part in parts(gaussians):
         rows = np.empty(len(part.means), _ROW)
         rows["mean"], rows["scale"] = part.means, part.scales

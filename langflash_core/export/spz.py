@@ -25,9 +25,9 @@ from langflash_core.export.packing import (
     check_some,
     from_smallest_three,
     has_zstd,
-    inflated,
+    inflate,
     smallest_three,
-    turned,
+    transform_rows,
     zstd_inflated,
     zstd_packed,
 )
@@ -83,14 +83,16 @@ def read_spz(path: Path, *, axes: str | None = None) -> Scene:
     if not content:
         raise SceneFileError(f"{path.name} is an empty file; {_REMEDY}")
     if content[:2] == b"\x1f\x8b":
-        header, streams, extensions = _unzipped(content, path.name)
+        header, streams, extensions = _unpack_gzip(content, path.name)
     else:
-        header, streams, extensions = _unpacked(content, path.name)
+        header, streams, extensions = _unpack_zstd(content, path.name)
     named = _named_axes(extensions, path.name)
     matrix = axes_matrix(named or axes or _STORED_AXES).T  # to ours
     gathering = Gathering(header.count, header.num_shown, path.name)
     for first in range(0, header.count, STORED.rows_at_once):
-        gathering.add(turned(_rows(header, streams, slice(first, first + STORED.rows_at_once)), matrix))
+        gathering.add(
+            transform_rows(_rows(header, streams, slice(first, first + STORED.rows_at_once)), matrix)
+        )
     model = ANTIALIASED if header.flags & SPZ_FORMAT.smoothed else PLAIN
     scene = to_scene(gathering, path.name, [], logs=True, logits=False, model=model)
     return scene.with_record(warnings=(*scene.record.warnings, *_of_axes(scene.gaussians, named, axes)))
@@ -110,7 +112,7 @@ def write_spz(scene: Scene, path: Path, *, version: int | None = None, axes: str
     check_some(scene.gaussians, path)
     if version is None:
         version = 4 if has_zstd() else 3
-    header, streams = _encoded(scene.gaussians, version, path.name, axes or _STORED_AXES)
+    header, streams = _encode(scene.gaussians, version, path.name, axes or _STORED_AXES)
     extensions = struct.pack("<III", SPZ_FORMAT.axes_extension, 4, AXES.index(axes) + 1) if axes else b""
     flags = (SPZ_FORMAT.smoothed if scene.record.antialiased else 0) | (
         SPZ_FORMAT.extended if extensions else 0
@@ -128,13 +130,13 @@ def write_spz(scene: Scene, path: Path, *, version: int | None = None, axes: str
     write_atomically(path, [head, extensions, table, *packed])
 
 
-def _unzipped(content: bytes, name: str) -> tuple[_Header, list[bytes], bytes]:
+def _unpack_gzip(content: bytes, name: str) -> tuple[_Header, list[bytes], bytes]:
     """Header, attribute streams and extensions of version 2 or 3.
 
     Raises:
         SceneFileError: another version, or cut off.
     """
-    head = inflated(content, _HEAD.size, name, wbits=31)
+    head = inflate(content, _HEAD.size, name, wbits=31)
     header = _header(head, name)
     if header.version not in (2, 3):
         raise SceneFileError(
@@ -145,7 +147,7 @@ def _unzipped(content: bytes, name: str) -> tuple[_Header, list[bytes], bytes]:
     after = (
         SPZ_FORMAT.most_extensions if header.flags & SPZ_FORMAT.extended else 1
     )  # asked for, so that an end that is missing shows
-    plain = inflated(content, _HEAD.size + needed + after, name, wbits=31)
+    plain = inflate(content, _HEAD.size + needed + after, name, wbits=31)
     if len(plain) < _HEAD.size + needed:
         raise SceneFileError(
             f"{name} is cut off: {header.count:,} Gaussians need {_HEAD.size + needed:,} bytes unpacked, "
@@ -158,7 +160,7 @@ def _unzipped(content: bytes, name: str) -> tuple[_Header, list[bytes], bytes]:
     return header, streams, plain[start:]
 
 
-def _unpacked(content: bytes, name: str) -> tuple[_Header, list[bytes], bytes]:
+def _unpack_zstd(content: bytes, name: str) -> tuple[_Header, list[bytes], bytes]:
     """Header, attribute streams and extensions of version 4.
 
     Raises:
@@ -251,7 +253,7 @@ def _rows(header: _Header, streams: list[bytes], some: slice) -> Rows:
     sh[:, 0] = (colours / np.float32(255) - 0.5) / SPZ_FORMAT.colour_scale
     sh[:, 1:] = (rest.reshape(len(places), -1, 3)[:, : header.num_shown - 1] - np.float32(128)) / 128
     return Rows(
-        _fixed(places) / np.float32(1 << header.bits),
+        _decode_fixed_point(places) / np.float32(1 << header.bits),
         _first_three(quats) if header.version == 2 else _signed_three(quats),
         scales / np.float32(16) - 10,
         opacities[:, 0] / np.float32(255),
@@ -259,7 +261,7 @@ def _rows(header: _Header, streams: list[bytes], some: slice) -> Rows:
     )
 
 
-def _fixed(places: np.ndarray) -> np.ndarray:
+def _decode_fixed_point(places: np.ndarray) -> np.ndarray:
     """Signed integers (n, 3) float32 of little-endian bytes (n, 9): exact, they have 24 bits."""
     low, middle, high = places.reshape(len(places), 3, 3).transpose(2, 0, 1).astype(np.int32)
     whole = low | middle << 8 | high << 16
@@ -282,7 +284,7 @@ def _signed_three(stored: np.ndarray) -> np.ndarray:
     return xyzw[:, [3, 0, 1, 2]]
 
 
-def _encoded(gaussians: Gaussians, version: int, name: str, axes: str) -> tuple[_Header, list[bytes]]:
+def _encode(gaussians: Gaussians, version: int, name: str, axes: str) -> tuple[_Header, list[bytes]]:
     """Header and attribute streams.
 
     Raises:
@@ -301,7 +303,7 @@ def _encoded(gaussians: Gaussians, version: int, name: str, axes: str) -> tuple[
     header = _Header(version, len(gaussians), degree, bits, 0, 0)
     matrix, columns = axes_matrix(axes), []
     for part in parts(gaussians):
-        columns.append(_columns(turned(part, matrix), version, bits))
+        columns.append(_columns(transform_rows(part, matrix), version, bits))
     return header, [b"".join(pieces) for pieces in zip(*columns, strict=True)]
 
 

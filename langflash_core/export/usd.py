@@ -21,7 +21,7 @@ from langflash_core.base.apart import Ended, Part, Refused, ask
 from langflash_core.base.files import written_atomically
 from langflash_core.errors import OutputError, SceneFileError
 from langflash_core.export.colours import Encoding, encoding_of, with_srgb_colours
-from langflash_core.export.packing import check_some, placed, told, turned
+from langflash_core.export.packing import check_some, error_line, place_rows, transform_rows
 from langflash_core.export.settings import STORED
 from langflash_core.export.stored import Gathering, Rows, parts, to_scene
 from langflash_core.geometry.harmonics import MAX_SHOWN_DEGREE
@@ -45,7 +45,7 @@ def read_usd(path: Path) -> Scene:
     Raises:
         SceneFileError: no OpenUSD, missing, damaged, without a usable Gaussian, or too much for OpenUSD.
     """
-    if not installed():
+    if not is_installed():
         raise SceneFileError(f"{path.name} cannot be read: {_ABSENT}")
     if not path.stat().st_size:
         raise SceneFileError(f"{path.name} is an empty file; {_REMEDY}")
@@ -53,11 +53,11 @@ def read_usd(path: Path) -> Scene:
         prims = [_prim(part, path.name) for part in ask("stage", {"path": str(path.absolute())})]
         if not prims:
             raise SceneFileError(f"{path.name} holds no Gaussians (no {_KIND}); {_REMEDY}")
-        gathering = _gathered(prims, path.name)
+        gathering = _gather_prims(prims, path.name)
     except Ended as error:
         raise SceneFileError(f"{path.name} cannot be read: OpenUSD {error}; {_REMEDY}") from error
     except (Refused, ValueError, TypeError, KeyError) as error:
-        raise SceneFileError(f"{path.name} is damaged or no USD ({told(error)}); {_REMEDY}") from error
+        raise SceneFileError(f"{path.name} is damaged or no USD ({error_line(error)}); {_REMEDY}") from error
     said = dict.fromkeys(encoding.said for *_, encoding in prims if encoding.said)
     return to_scene(gathering, path.name, list(said), logs=False, logits=False)
 
@@ -94,7 +94,7 @@ def _reason(error: Exception) -> str:
     return first.partition(" : '")[2].removesuffix("'") or first
 
 
-def installed() -> bool:
+def is_installed() -> bool:
     """Whether there is an OpenUSD; without importing it."""
     return importlib.util.find_spec("pxr") is not None
 
@@ -136,18 +136,18 @@ def _prim(part: Part, name: str) -> _Prim:
 
 
 @np.errstate(all="ignore")  # numbers that are not finite are left out, and said
-def _gathered(prims: list[_Prim], name: str) -> Gathering:
+def _gather_prims(prims: list[_Prim], name: str) -> Gathering:
     num_bases = max(rows.sh.shape[1] for rows, *_ in prims)
     gathering = Gathering(sum(len(rows.means) for rows, *_ in prims), num_bases, name)
     for rows, place, axes, encoding in prims:
         for first in range(0, len(rows.means), STORED.rows_at_once):
             some = Rows(*(values[first : first + STORED.rows_at_once] for values in rows.all()))
             some = with_srgb_colours(some) if encoding.linear else some
-            gathering.add(_padded(placed(some, place, axes), num_bases))
+            gathering.add(_pad_harmonics(place_rows(some, place, axes), num_bases))
     return gathering
 
 
-def _padded(rows: Rows, num_bases: int) -> Rows:
+def _pad_harmonics(rows: Rows, num_bases: int) -> Rows:
     missing = num_bases - rows.sh.shape[1]
     sh = np.pad(rows.sh, ((0, 0), (0, missing), (0, 0))) if missing else rows.sh
     return Rows(rows.means, rows.quats, rows.scales, rows.opacities, sh)
@@ -156,7 +156,7 @@ def _padded(rows: Rows, num_bases: int) -> Rows:
 def _write_stage(scene: Scene, path: Path, pxr) -> None:
     num_bases = min(scene.gaussians.sh.shape[1], (MAX_SHOWN_DEGREE + 1) ** 2)
     matrix = axes_matrix(_AXES["Y"])
-    turned_parts = [turned(part, matrix) for part in parts(scene.gaussians)]
+    turned_parts = [transform_rows(part, matrix) for part in parts(scene.gaussians)]
     means, quats, scales, opacities, sh = (
         np.ascontiguousarray(np.concatenate(values))
         for values in zip(*(part.all() for part in turned_parts), strict=True)

@@ -78,7 +78,7 @@ def fuse(
     if not (field[seen] > 0).any() or not (field[seen] < 0).any():
         return None
     places, faces, _, _ = marching_cubes(field, 0.0, gradient_direction="descent", allow_degenerate=False)
-    known = _known(seen)
+    known = _known_cells(seen)
     cells = np.minimum(
         places[faces].mean(1).astype(int), np.array(known.shape) - 1
     )  # the last plane has none
@@ -87,10 +87,10 @@ def fuse(
         return None
     used, faces = np.unique(faces, return_inverse=True)
     vertices = low + voxel * places[used].astype(np.float64)
-    return Surface(vertices, faces.reshape(-1, 3), _coloured(views, vertices, FUSION.band * voxel))
+    return Surface(vertices, faces.reshape(-1, 3), _vertex_colours(views, vertices, FUSION.band * voxel))
 
 
-def _known(seen: Bool[np.ndarray, "X Y Z"]) -> Bool[np.ndarray, "x y z"]:
+def _known_cells(seen: Bool[np.ndarray, "X Y Z"]) -> Bool[np.ndarray, "x y z"]:
     """Cells between voxels whose eight corners were seen: elsewhere a zero is the rim of what is known."""
     for axis in range(3):
         seen = np.delete(seen, 0, axis) & np.delete(seen, -1, axis)
@@ -119,7 +119,7 @@ def _field(
     return field.reshape(shape), seen.reshape(shape)
 
 
-def _coloured(
+def _vertex_colours(
     views: Sequence[ColouredView], vertices: Float[np.ndarray, "V 3"], reach: float
 ) -> UInt8[np.ndarray, "V 3"]:
     """Mean colour of the pixels that show a vertex; grey where none does."""

@@ -74,7 +74,7 @@ def found_directions(sights: Sights, up: Float[np.ndarray, " 3"] | None = None) 
         The best of them; the camera's own where nothing tells any.
     """
     starts = _starts(sights) if up is None else [up / np.linalg.norm(up)]
-    tried = [_fitted(sights, _walls_of(sights, start), fixed=up is not None) for start in starts]
+    tried = [_fit_axes(sights, _walls_of(sights, start), fixed=up is not None) for start in starts]
     return max(tried, key=lambda found: _agreement(sights, found.axes))
 
 
@@ -85,7 +85,7 @@ def _starts(sights: Sights) -> list[np.ndarray]:
     home = sights.cameras[0].T
     turns = Rotation.from_euler("zx", [(roll, pitch) for roll in _ROLLS for pitch in _PITCHES], degrees=True)
     ups = (home @ turns.apply([0.0, -1.0, 0.0]).T).T  # (U, 3)
-    scores = _edges_say(sights, ups) + _surfaces_say(sights, ups) + np.log(_held(sights, ups))
+    scores = _edges_say(sights, ups) + _surfaces_say(sights, ups) + np.log(_prior_belief(sights, ups))
     chosen: list[np.ndarray] = []
     for row in np.argsort(-scores, kind="stable"):
         if all(ups[row] @ other < math.cos(math.radians(MANHATTAN.apart)) for other in chosen):
@@ -123,7 +123,7 @@ def _surfaces_say(sights: Sights, ups: np.ndarray) -> np.ndarray:
     return MANHATTAN.surfaces_say * flat.mean(0)
 
 
-def _held(sights: Sights, ups: np.ndarray) -> np.ndarray:
+def _prior_belief(sights: Sights, ups: np.ndarray) -> np.ndarray:
     """(U,) belief in directions before edges and surfaces are looked at: people hold cameras about level, and
     what is known to be level is across up."""
     belief = np.ones(len(ups))
@@ -167,7 +167,7 @@ def _sides(up: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return along, np.cross(up, along)
 
 
-def _fitted(sights: Sights, axes: np.ndarray, fixed: bool) -> Directions:
+def _fit_axes(sights: Sights, axes: np.ndarray, fixed: bool) -> Directions:
     """Gauss-Newton from these axes; with `fixed`, about their up alone."""
     from scipy.spatial.transform import Rotation
 
@@ -223,7 +223,9 @@ def _agreement(sights: Sights, axes: np.ndarray) -> float:
     """How much speaks for three directions: logarithms of chances, of edges, of surfaces and of belief."""
     up, width = axes[:, 2][None], MANHATTAN.rounds[-1]
     near = _near(np.abs(sights.edges @ axes), width).sum(1, keepdims=True)
-    told = _likely(sights.lengths, near, width) + _surfaces_say(sights, up) + np.log(_held(sights, up))
+    told = (
+        _likely(sights.lengths, near, width) + _surfaces_say(sights, up) + np.log(_prior_belief(sights, up))
+    )
     return float(told[0])
 
 

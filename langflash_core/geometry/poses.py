@@ -249,7 +249,7 @@ def roll(pose: Pose, up: Float[np.ndarray, "3"]) -> float:
     return 0.0 if math.hypot(across, along) < 1e-6 else math.atan2(-across, -along)
 
 
-def righted(pose: Pose, up: Float[np.ndarray, "3"], share: float = 1.0) -> Pose:
+def make_upright(pose: Pose, up: Float[np.ndarray, "3"], share: float = 1.0) -> Pose:
     """The pose from the same place in the same direction, upright; or so much of the way there."""
     turn = -share * roll(pose, up)
     return replace(pose, rotation=_rotation(about(pose.axes[:, 2], turn) @ pose.axes)) if turn else pose
@@ -381,7 +381,7 @@ def _between(start: Pose, end: Pose, t: float, up: np.ndarray) -> Rotation:
 
 def _angles(pose: Pose, up: np.ndarray, level: np.ndarray) -> tuple[float, float, float]:
     """Heading of the picture's right side, pitch and roll, radians."""
-    across = level @ righted(pose, up).axes[:, 0]
+    across = level @ make_upright(pose, up).axes[:, 0]
     pitch = math.asin(min(max(float(pose.axes[:, 2] @ up), -1.0), 1.0))
     return math.atan2(across[1], across[0]), pitch, roll(pose, up)
 

@@ -24,7 +24,7 @@ def along(cameras: list[Camera], times: list[float], size: tuple[int, int] | Non
     from scipy.spatial.transform import Rotation, RotationSpline
 
     width, height = even(size or (cameras[0].width, cameras[0].height))
-    sized = [camera.resized(width, height) for camera in cameras]
+    sized = [camera.with_size(width, height) for camera in cameras]
     turns = np.stack([camera.viewmat[:3, :3].double().numpy() for camera in sized])
     centres = np.stack([-R.T @ c.viewmat[:3, 3].double().numpy() for R, c in zip(turns, sized, strict=True)])
     lenses = PchipInterpolator(times, np.stack([camera.K.double().numpy() for camera in sized]))

@@ -35,7 +35,7 @@ class Film:
 
 
 class Reader:
-    """An open film; see `opened`. doubtful: pictures given so far that came equal to the last bit, as none
+    """An open film; see `open_film`. doubtful: pictures given so far that came equal to the last bit, as none
     of a camera are, from the only decoder that there is: it may not know the film's kind."""
 
     def __init__(self, path: Path, film: Film) -> None:
@@ -54,7 +54,7 @@ class Reader:
             FilmError: its decoder broke, took too long, or wanted too much memory; a picture is too large.
         """
         bounds = {"start": start, "end": end, "looks": LOOKING.looks, "pixels": PIXELS.value}
-        with closing(_asked("film pictures", self._path, bounds)) as parts:
+        with closing(_ask_reader("film pictures", self._path, bounds)) as parts:
             for part in parts:
                 check()
                 if "picture" in part.arrays:
@@ -63,7 +63,7 @@ class Reader:
 
 
 @contextmanager
-def opened(path: Path) -> Iterator[Reader]:
+def open_film(path: Path) -> Iterator[Reader]:
     """A film to read.
 
     Raises:
@@ -76,7 +76,7 @@ def opened(path: Path) -> Iterator[Reader]:
         )
     if not path.stat().st_size:
         raise FilmError(f"{name} is an empty file; copy it again, or {_REMEDY}")
-    (part,) = _asked("film", path, {})
+    (part,) = _ask_reader("film", path, {})
     width, height = int(part.facts["width"]), int(part.facts["height"])
     if min(width, height) < LOOKING.min_side:
         raise FilmError(f"{name} is only {width} x {height} pixels; film at least 480 pixels a side")
@@ -85,7 +85,7 @@ def opened(path: Path) -> Iterator[Reader]:
     yield Reader(path, Film(name, width, height, float(part.facts["seconds"])))
 
 
-def _asked(reader: str, path: Path, bounds: Mapping[str, Any]) -> Generator[Part, None, None]:
+def _ask_reader(reader: str, path: Path, bounds: Mapping[str, Any]) -> Generator[Part, None, None]:
     """Raises:
     FilmError: it cannot be decoded, or its decoder broke.
     """

@@ -21,7 +21,7 @@ from langflash_core.base.files import filled_atomically, write_atomically
 from langflash_core.base.resources import home_folder
 from langflash_core.base.running import Progress
 from langflash_core.errors import FilmError, OutputError
-from langflash_core.images.film import Reader, opened
+from langflash_core.images.film import Reader, open_film
 from langflash_core.images.motion import (
     Follower,
     Look,
@@ -44,8 +44,8 @@ from langflash_core.images.strip import (
     Still,
     Strip,
     choose,
+    encode_index,
     read_strip,
-    written,
 )
 
 STAGE = "film"
@@ -78,7 +78,7 @@ def strip_of(
         FilmError: it cannot be decoded, or shows nothing that can be followed.
     """
     name = path.name
-    with opened(path):  # a film that cannot be read has no place in the cache
+    with open_film(path):  # a film that cannot be read has no place in the cache
         stamp = path.stat()
     order = [
         FORMAT,
@@ -98,10 +98,10 @@ def strip_of(
         with suppress(OSError):
             os.utime(folder)
         return kept
-    with filled_atomically(folder) as filling, opened(path) as reader:
+    with filled_atomically(folder) as filling, open_film(path) as reader:
         watched = _Watch(filling, reader, every, end)
         strip = watched.strip(start, end, progress, check)
-        write_atomically(filling / INDEX, written(strip))
+        write_atomically(filling / INDEX, encode_index(strip))
     _sweep(films, folder)
     return replace(strip, folder=folder)
 

@@ -34,12 +34,12 @@ class Look:
 def look_at(picture: UInt8[np.ndarray, "H W 3"]) -> Look:
     """Judge a picture."""
     grey = cv2.cvtColor(_shrunk(picture, MOTION.sharp_side), cv2.COLOR_BGR2GRAY)
-    smooth = _smoothed(grey)
+    smooth = _smooth(grey)
     sharpness = float(cv2.Laplacian(smooth, cv2.CV_32F).var())
     return Look(_shrunk(grey, MOTION.side), sharpness, _farther(smooth), float(np.percentile(grey, 90)) / 255)
 
 
-def _smoothed(grey: Grey) -> Grey:
+def _smooth(grey: Grey) -> Grey:
     """Grain and coding are no detail."""
     return cv2.GaussianBlur(grey, (3, 3), 0).astype(np.uint8, copy=False)
 
@@ -93,18 +93,18 @@ class Follower:
         """How far this picture has moved; None where it shows another place."""
         if self.last is None or self.last.shape != grey.shape:
             return None
-        there, found = _tracked(self.last, grey, self._now)
+        there, found = _track_corners(self.last, grey, self._now)
         share = float(found.mean()) if len(found) else 0.0
         # a step too wide for corners: the whole picture tells about where to seek them
         if share < MOTION.weak:
-            on, again = _tracked(self.last, grey, self._now, _shift(self.last, grey))
+            on, again = _track_corners(self.last, grey, self._now, _shift(self.last, grey))
             if again.sum() > found.sum():
                 there, found, share = on, again, float(again.mean())
         if share < MOTION.lost or found.sum() < MOTION.fewest // 2:
             return None
         self._anchored, self._marked = self._anchored[found], self._marked[found]
         self._now, self.last = there[found], grey
-        return Moved(_gone(self._anchored, self._now, grey), _gone(self._marked, self._now, grey))
+        return Moved(_way_gone(self._anchored, self._now, grey), _way_gone(self._marked, self._now, grey))
 
     @property
     def weak(self) -> bool:
@@ -131,8 +131,8 @@ def from_one_place(one: Grey, other: Grey) -> bool:
     points = _corners(one)
     if len(points) < MOTION.fewest:
         return False
-    there, found = _tracked(one, other, points)
-    return bool(found.mean() > 0.5) and _gone(points[found], there[found], one, MOTION.most) < MOTION.same
+    there, found = _track_corners(one, other, points)
+    return bool(found.mean() > 0.5) and _way_gone(points[found], there[found], one, MOTION.most) < MOTION.same
 
 
 @dataclass(frozen=True)
@@ -166,7 +166,7 @@ def step_between(one: Marks, other: Marks, grey: Grey) -> float | None:
     if agree is None or agree.sum() < max(MOTION.joins, MOTION.agree * len(good)):
         return None
     kept = agree.ravel() == 1
-    return _gone(here[kept], there[kept], grey)
+    return _way_gone(here[kept], there[kept], grey)
 
 
 def _shrunk(picture: np.ndarray, side: int) -> np.ndarray:
@@ -196,7 +196,7 @@ def _shift(one: np.ndarray, other: np.ndarray) -> np.ndarray:
     return 2 * np.array(moved, np.float32)
 
 
-def _tracked(
+def _track_corners(
     one: np.ndarray, other: np.ndarray, points: np.ndarray, shift: np.ndarray | None = None
 ) -> tuple[np.ndarray, np.ndarray]:
     """Where `points` (P, 2) of one picture are in the other, sought from `shift` on, and which were found
@@ -225,7 +225,7 @@ def _flow(one: np.ndarray, other: np.ndarray, points: np.ndarray, guess: np.ndar
     )
 
 
-def _gone(before: np.ndarray, now: np.ndarray, grey: np.ndarray, percent: float = MOTION.far) -> float:
+def _way_gone(before: np.ndarray, now: np.ndarray, grey: np.ndarray, percent: float = MOTION.far) -> float:
     """Way that so many per cent of the corners do not exceed, share of the side."""
     stay, far = np.percentile(np.linalg.norm(now - before, axis=1), (MOTION.stay, percent))
     return float(stay if stay < MOTION.moves else far) / math.sqrt(grey.size)

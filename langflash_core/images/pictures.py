@@ -82,7 +82,7 @@ def read_pictures(
 
 def _picture(photo: Photo, size: tuple[int, int]) -> Picture:
     box = centre_box(photo.width, photo.height, size)
-    pixels, source = np.asarray(_scaled(photo, box, size)), _source_jpeg(photo, box, size)
+    pixels, source = np.asarray(_downscale(photo, box, size)), _source_jpeg(photo, box, size)
     return Picture(photo.facts, box, pixels, source, judged_grey(photo.image))
 
 
@@ -144,7 +144,7 @@ def centre_box(width: int, height: int, size: tuple[int, int]) -> Box:
     return left, top, left + crop_width, top + crop_height
 
 
-def _scaled(photo: Photo, box: Box, size: tuple[int, int]) -> Image.Image:
+def _downscale(photo: Photo, box: Box, size: tuple[int, int]) -> Image.Image:
     """Lanczos over the box; a long way down starts with whole-number box averages."""
     left, top, right, bottom = (side / photo.reduction for side in box)
     inside = max(0.0, left), max(0.0, top), min(right, photo.image.width), min(bottom, photo.image.height)
@@ -165,7 +165,7 @@ def _source_jpeg(photo: Photo, box: Box, size: tuple[int, int]) -> bytes:
     long_side = min(PHOTO_LIMITS.source_side, max(box[2] - box[0], box[3] - box[1]) + 1e-6)
     steps = max(1, int(long_side / max(columns, rows)))
     stream = io.BytesIO()
-    _scaled(photo, box, (columns * steps, rows * steps)).save(
+    _downscale(photo, box, (columns * steps, rows * steps)).save(
         stream, "JPEG", quality=PHOTO_LIMITS.source_quality
     )
     return stream.getvalue()

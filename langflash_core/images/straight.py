@@ -29,7 +29,7 @@ def after(before: FoundFocal | None, found: FoundFocal) -> FoundFocal:
     return replace(found, bend=found.bend + before.bend * ratio**2)
 
 
-def straightened(views: Views, found: Sequence[FoundFocal | None]) -> Views:
+def straighten_views(views: Views, found: Sequence[FoundFocal | None]) -> Views:
     """The views as straight lenses would have taken them; what is said of their focal lengths grows by s.
 
     Args:
@@ -66,31 +66,31 @@ def smallest_scale(size: tuple[int, int], centre: np.ndarray, bend: float) -> fl
     low, high = STRAIGHTEN.scales
     for _ in range(STRAIGHTEN.steps):
         middle = (low + high) / 2
-        places = bent(border / middle, bend) + centre
+        places = distort(border / middle, bend) + centre
         steep = 1 + 3 * bend * ((border / middle) ** 2).sum(1).max() > STRAIGHTEN.steepest
         inside = steep and (places >= 0).all() and (places <= np.array(size)).all()
         low, high = (low, middle) if inside else (middle, high)
     return high
 
 
-def bent(places: np.ndarray, bend: float) -> np.ndarray:
+def distort(places: np.ndarray, bend: float) -> np.ndarray:
     """Where a lens puts what a straight one puts at `places` (n, 2), from the principal point."""
     return places * (1 + bend * (places**2).sum(-1, keepdims=True))
 
 
-def _drawn(pixels: np.ndarray, centre: np.ndarray, bend: float, scale: float) -> np.ndarray:
+def _undistort(pixels: np.ndarray, centre: np.ndarray, bend: float, scale: float) -> np.ndarray:
     """Pixels (h, w, 3), straightened; numbers in their own pixels, the first one's middle is at .5."""
     height, width = pixels.shape[:2]
     columns, rows = np.meshgrid(np.arange(width) + 0.5, np.arange(height) + 0.5)
     straight = (np.stack((columns, rows), -1) - centre) / scale
-    places = (bent(straight, bend) + centre - 0.5).astype(np.float32)
+    places = (distort(straight, bend) + centre - 0.5).astype(np.float32)
     nearest = cv2.BORDER_REPLICATE
     return cv2.remap(pixels, places, None, cv2.INTER_CUBIC, borderMode=nearest)  # pyright: ignore
 
 
 def _redrawn(image: Tensor, centre: np.ndarray, bend: float, scale: float) -> Tensor:
     """An image (3, H, W) in [0, 1]."""
-    drawn = _drawn(image.movedim(0, -1).numpy(), centre, bend, scale)
+    drawn = _undistort(image.movedim(0, -1).numpy(), centre, bend, scale)
     return torch.from_numpy(drawn).movedim(-1, 0).clamp(0, 1).contiguous()
 
 
@@ -101,5 +101,5 @@ def _redrawn_source(
     pixels = cv2.imdecode(np.frombuffer(source, np.uint8), cv2.IMREAD_COLOR)
     assert pixels is not None, "sources are JPEG bytes that images/ wrote"
     times = pixels.shape[1] / size[0]
-    drawn = _drawn(pixels, centre * times, bend / times**2, scale)
+    drawn = _undistort(pixels, centre * times, bend / times**2, scale)
     return cv2.imencode(".jpg", drawn, [cv2.IMWRITE_JPEG_QUALITY, STRAIGHTEN.quality])[1].tobytes()

@@ -65,7 +65,7 @@ class Strip:
     notes: tuple[str, ...] = ()
 
     @property
-    def looked(self) -> int:
+    def num_looked_at(self) -> int:
         """Frames that were looked at."""
         return sum(still.looks for still in self.stills) + self.dark + self.plain
 
@@ -123,7 +123,7 @@ def choose(strip: Strip, most: int, fewest: int = 2) -> Choice:
         chosen = indices[_best(places[indices], np.log(relative[indices].clip(0.05)), count)]
     gaps = np.diff(places[chosen])
     gap = float(gaps.max()) if len(gaps) else 0.0
-    left = _left(strip, blurred, until, chosen.tolist())
+    left = _count_left_out(strip, blurred, until, chosen.tolist())
     return Choice(tuple(chosen.tolist()), relative, left, gap, until)
 
 
@@ -216,7 +216,7 @@ def _evenly(indices: Int[np.ndarray, " S"], most: int) -> Int[np.ndarray, " N"]:
     return indices[np.round(np.linspace(0, len(indices) - 1, most)).astype(np.int64)]
 
 
-def _left(
+def _count_left_out(
     strip: Strip, blurred: Bool[np.ndarray, " S"], until: float | None, chosen: list[int]
 ) -> dict[str, int]:
     """Frames left out, by reason; together with the chosen ones all that were looked at."""
@@ -230,14 +230,14 @@ def _left(
             itself = index in chosen and still.smear > CHOOSING.smeared
             left["blurred"] += still.looks if blurred[index] else still.blurred - itself
     left |= {"dark": strip.dark, "plain": strip.plain}
-    left["between"] = strip.looked - len(chosen) - sum(left.values())
+    left["between"] = strip.num_looked_at - len(chosen) - sum(left.values())
     return left
 
 
 # Files
 
 
-def written(strip: Strip) -> bytes:
+def encode_index(strip: Strip) -> bytes:
     """The strip's index as a file."""
     entry = asdict(strip) | {"format": FORMAT}
     del entry["folder"]

@@ -46,13 +46,13 @@ def check_shown(names: Sequence[str], images: Sequence[Tensor]) -> None:
     Raises:
         ImageError: all are black, white, or of one colour, as with a lens cap on.
     """
-    if any(_spread(image) >= JUDGING.blank_spread for image in images):
+    if any(_brightness_range(image) >= JUDGING.blank_spread for image in images):
         return
     subject = f"{names[0]} shows" if len(names) == 1 else "the photos show"
     raise ImageError(f"{subject} nothing, all pixels are alike; take photos of a place, with light")
 
 
-def _spread(image: Tensor) -> float:
+def _brightness_range(image: Tensor) -> float:
     """Between the first and the last hundredth of an image's pixels."""
     low, high = torch.quantile(image.mean(0).flatten(), torch.tensor([0.01, 0.99])).tolist()
     return high - low

@@ -87,7 +87,7 @@ def source_picture(views: Views, view: int) -> Tensor:
     """The largest version of one photo at hand, (3, h, w) in [0, 1]; the same crop as the views."""
     if not views.sources:
         return views.images[view]
-    return _decoded(views.sources[view])
+    return _decode_photo(views.sources[view])
 
 
 def source_size(views: Views, view: int) -> tuple[int, int]:
@@ -149,7 +149,7 @@ def _image(picture: Picture) -> Tensor:
     return torch.from_numpy(pixels).permute(2, 0, 1).contiguous() / 255
 
 
-def _decoded(source: bytes) -> Tensor:
+def _decode_photo(source: bytes) -> Tensor:
     """(3, h, w) in [0, 1]."""
     with opened_picture(source, STORED) as picture:
         pixels = np.array(picture.convert("RGB"), dtype=np.float32)

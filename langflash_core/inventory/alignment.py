@@ -52,7 +52,7 @@ class Fit:
         )
 
 
-def aligned(first: Inventory, second: Inventory, render: Render) -> Fit:
+def align_scenes(first: Inventory, second: Inventory, render: Render) -> Fit:
     """Raises:
     InputError: a scene holds no photos, too few of their key points match, or lengths that were told for both
         differ by too much.
@@ -60,11 +60,11 @@ def aligned(first: Inventory, second: Inventory, render: Render) -> Fit:
     for found in (first, second):
         if not found.scene.photos:
             raise InputError("scenes are compared by their photos, and one has none; name scenes of photos")
-    ours, theirs = _matched(_described(first, render), _described(second, render))
+    ours, theirs = _match_keypoints(_describe_keypoints(first, render), _describe_keypoints(second, render))
     metres = first.unit == second.unit == "m"
     told = metres and not (first.guess or second.guess)
     for most in ALIGNMENT.scales if metres else ALIGNMENT.scales[1:]:
-        fit = _fitted(ours, theirs, first.metre, most)
+        fit = _fit_transform(ours, theirs, first.metre, most)
         if fit is None or fit.matches < max(ALIGNMENT.least, ALIGNMENT.agree * fit.tried):
             continue
         if told and most > ALIGNMENT.scales[0]:
@@ -76,7 +76,7 @@ def aligned(first: Inventory, second: Inventory, render: Render) -> Fit:
     raise InputError("the photos of both scenes show too little in common; take some from the same places")
 
 
-def _described(found: Inventory, render: Render) -> tuple[np.ndarray, np.ndarray]:
+def _describe_keypoints(found: Inventory, render: Render) -> tuple[np.ndarray, np.ndarray]:
     """Places (n, 3) in the world of all photos' key points, and their descriptors (n, 128)."""
     places: list[np.ndarray] = [np.zeros((0, 3))]
     descriptors: list[np.ndarray] = [np.zeros((0, 128), np.float32)]
@@ -111,15 +111,15 @@ def _world_places(
     rays = np.concatenate((pixels, np.ones((len(pixels), 1))), 1) @ np.linalg.inv(camera.K.double().numpy()).T
     pose = invert_rigid(camera.viewmat.double()).cpu().numpy()
     points = (rays * depths[:, None]) @ pose[:3, :3].T + pose[:3, 3]
-    return _stood(found, points), covered & (depths > 0)
+    return _upright_points(found, points), covered & (depths > 0)
 
 
-def _stood(found: Inventory, points: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 3"]:
+def _upright_points(found: Inventory, points: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 3"]:
     """Points of the scene in its world, in the inventory's unit."""
     return found.scale * (points - np.array(found.world.origin)) @ turn_of(found.world).T
 
 
-def _matched(ours, theirs) -> tuple[np.ndarray, np.ndarray]:
+def _match_keypoints(ours, theirs) -> tuple[np.ndarray, np.ndarray]:
     """Places (n, 3) of key points that are each other's nearest, in both worlds."""
     if min(len(ours[1]), len(theirs[1])) < 2:
         return np.zeros((0, 3)), np.zeros((0, 3))
@@ -135,7 +135,7 @@ def _matched(ours, theirs) -> tuple[np.ndarray, np.ndarray]:
     return ours[0][rows[:, 0]], theirs[0][rows[:, 1]]
 
 
-def _fitted(
+def _fit_transform(
     ours: Float[np.ndarray, "n 3"],
     theirs: Float[np.ndarray, "n 3"],
     metre: float,

@@ -21,10 +21,10 @@ from scipy.spatial import KDTree
 
 from langflash_core.errors import InputError
 from langflash_core.geometry.harmonics import SH_C0
-from langflash_core.inventory.alignment import Fit, Render, aligned
+from langflash_core.inventory.alignment import Fit, Render, align_scenes
 from langflash_core.inventory.gone import Fate, changes, fate
 from langflash_core.inventory.settings import BESIDE, GONE
-from langflash_core.inventory.things import OPENINGS, Inventory, Thing, unlisted, unsure
+from langflash_core.inventory.things import OPENINGS, Inventory, Thing, unlisted_thing, unsure
 from langflash_core.scene.thin import covered_areas
 
 
@@ -65,19 +65,21 @@ def difference(first: Inventory, second: Inventory, render: Render) -> Differenc
         raise InputError(
             f"one scene speaks {spaces[0]}, the other {spaces[1]}; make both with the same language"
         )
-    fit, metre = aligned(first, second, render), first.metre
+    fit, metre = align_scenes(first, second, render), first.metre
     fates = (
         fate(first, second, fit.inverse, render, metre / fit.scale),
         fate(second, first, fit, render, metre),
     )
     every = (*first.things, *unsure(first)), (*second.things, *unsure(second))
     gone, come = _absent(first, fates[0]), _absent(second, fates[1])
-    moved = _paired(_seen(first, gone), _seen(second, come, fit), metre, far=True)
+    moved = _pair_things(_look_at_things(first, gone), _look_at_things(second, come, fit), metre, far=True)
     here = [
         [thing for thing in things if not _has_gone(found, thing, told)]
         for found, things, told in zip((first, second), every, fates, strict=True)
     ]
-    still = _paired(_seen(first, here[0]), _seen(second, here[1], fit), metre, far=False)
+    still = _pair_things(
+        _look_at_things(first, here[0]), _look_at_things(second, here[1], fit), metre, far=False
+    )
     flat = [pair for pair in still if _flat(pair.before, metre) and pair.by > _still(pair.before, metre)]
     had = {pair.before.id for pair in (*moved, *still)} | {thing.id for thing in gone}
     listed = {thing.id for thing in first.things}
@@ -98,7 +100,7 @@ def _absent(found: Inventory, told: Fate) -> list[Thing]:
     for rows in changes(found, told.gone & ~_stands(found, told)):
         left = rows[~taken[rows]]
         if _fills(found, left) >= max(GONE.least, BESIDE.rest * _fills(found, rows)):
-            things.append(unlisted(found, left, things))
+            things.append(unlisted_thing(found, left, things))
     return things
 
 
@@ -157,7 +159,7 @@ def _flat(thing: Thing, metre: float) -> bool:
     return thing.kind not in OPENINGS and min(thing.size) < BESIDE.flat * metre
 
 
-def _placed(thing: Thing, fit: Fit) -> Thing:
+def _place_thing(thing: Thing, fit: Fit) -> Thing:
     """A thing of the second scene in the first's world."""
     place = fit.placed(np.array([thing.place]))[0]
     yaw = math.degrees(math.atan2(fit.turn[2, 0], fit.turn[0, 0]))
@@ -200,13 +202,14 @@ class _Seen:
     look: _Look
 
 
-def _seen(found: Inventory, things: Sequence[Thing], fit: Fit | None = None) -> list[_Seen]:
+def _look_at_things(found: Inventory, things: Sequence[Thing], fit: Fit | None = None) -> list[_Seen]:
     return [
-        _Seen(thing, thing if fit is None else _placed(thing, fit), _look(found, thing)) for thing in things
+        _Seen(thing, thing if fit is None else _place_thing(thing, fit), _look(found, thing))
+        for thing in things
     ]
 
 
-def _paired(before: Sequence[_Seen], after: Sequence[_Seen], metre: float, *, far: bool) -> list[Pair]:
+def _pair_things(before: Sequence[_Seen], after: Sequence[_Seen], metre: float, *, far: bool) -> list[Pair]:
     """Things that may be the same, so that the sum of their differences is least.
 
     Args:

@@ -62,10 +62,10 @@ def fate(whose: Inventory, other: Inventory, fit: Fit, render: Render, metre: fl
         _sight(other.scene, view, points, own, unit, render, other.scale / metre)
         for view in range(other.scene.num_views)
     ]
-    return _judged(sights, 0.5 + SH_C0 * whose.scene.gaussians.sh[:, 0].double().numpy())
+    return _judge_fate(sights, 0.5 + SH_C0 * whose.scene.gaussians.sh[:, 0].double().numpy())
 
 
-def _judged(sights: list[_Sight], colours: Float[np.ndarray, "N 3"]) -> Fate:
+def _judge_fate(sights: list[_Sight], colours: Float[np.ndarray, "N 3"]) -> Fate:
     differ = _differ(sights, colours)
     known, gone = np.zeros(len(colours), bool), np.zeros(len(colours), bool)
     for sight in sights:

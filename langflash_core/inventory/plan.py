@@ -83,8 +83,8 @@ def floor_plan(found: Inventory) -> Plan:
     metre = 1.0 if found.unit == "m" else _room_size(found) / 4
     pieces = _upright_pieces(found, metre)
     turn = _common_turn(pieces)
-    matrix = _turned(turn)
-    walls = _met(_walls(pieces.along(matrix), metre), metre)
+    matrix = _rotation_matrix(turn)
+    walls = _extend_to_corners(_walls(pieces.along(matrix), metre), metre)
     walls = [_back(wall, matrix) for wall in walls]
     others = [thing for thing in found.things if thing.kind not in OPENINGS]
     walls = [wall for wall in walls if not (wall.doubt and any(goes_through(t, wall, metre) for t in others))]
@@ -159,7 +159,7 @@ def _common_turn(pieces: _Pieces) -> float:
     return 0.0 if abs(mean) < 1e-12 else math.atan2(mean.imag, mean.real) / 4
 
 
-def _turned(turn: float) -> np.ndarray:
+def _rotation_matrix(turn: float) -> np.ndarray:
     return np.array([[math.cos(turn), math.sin(turn)], [-math.sin(turn), math.cos(turn)]])
 
 
@@ -236,7 +236,7 @@ def _runs(along: np.ndarray, weights: np.ndarray, metre: float) -> list[tuple[fl
     return [(low, high) for low, high in runs if high - low >= FLOOR_PLAN.shortest * metre]
 
 
-def _met(walls: list[PlanWall], metre: float) -> list[PlanWall]:
+def _extend_to_corners(walls: list[PlanWall], metre: float) -> list[PlanWall]:
     """Walls whose ends lie on the walls that they meet."""
     met = []
     for wall in walls:

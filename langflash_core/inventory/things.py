@@ -23,7 +23,7 @@ from torch import Tensor
 
 from langflash_core.base.records import Guess, World
 from langflash_core.errors import InputError
-from langflash_core.export import opened
+from langflash_core.export import open_scene
 from langflash_core.inventory.apart import DEEPEST, taken_apart
 from langflash_core.inventory.pieces import STRUCTURE, Parts, parts_of_room
 from langflash_core.inventory.settings import LISTING
@@ -174,7 +174,7 @@ def inventory(
     Raises:
         InputError: the scene holds nothing. PromptError: it has no language. WeightsError: it has no weights.
     """
-    scene = opened(scene)
+    scene = open_scene(scene)
     if not len(scene.gaussians):
         raise InputError("this scene is empty; make it again, or undo what deleted it")
     surface = fused_rows(scene).cpu() if scene.layered else None
@@ -197,7 +197,7 @@ def unsure(whole: Inventory) -> tuple[Thing, ...]:
     return tuple(thing for thing in _things(whole, 0.0, LISTING.least_share) if thing.id not in listed)
 
 
-def unlisted(whole: Inventory, rows: Integer[np.ndarray, " n"], others: Sequence[Thing]) -> Thing:
+def unlisted_thing(whole: Inventory, rows: Integer[np.ndarray, " n"], others: Sequence[Thing]) -> Thing:
     """Some rows of a scene as a thing that the inventory does not list, called what they answer best.
 
     Args:
@@ -207,7 +207,7 @@ def unlisted(whole: Inventory, rows: Integer[np.ndarray, " n"], others: Sequence
     areas, seen = covered_areas(scene.gaussians), whole.shares[:, rows].sum(1)
     space, some = language_space(scene.semantics.space), scene.semantics.rows(torch.from_numpy(rows))
     weights = torch.from_numpy(areas[rows] + 1e-12)
-    kind, _ = _called(scene, rows, weights.numpy(), names)
+    kind, _ = _best_name(scene, rows, weights.numpy(), names)
     relevance = gaussian_relevance(some, compile_query(scene, space, [kind]))[0]
     sure = float(relevance @ weights.to(relevance) / weights.sum())
     taken = {thing.id for thing in (*whole.things, *others)}
@@ -278,13 +278,13 @@ def _no_deeper(whole: Inventory, least: float) -> Parts:
         numbers[own] = np.where(told < 0, -1, len(kinds) + told)
         for number in range(int(told.max(initial=-1)) + 1):
             rows = own[told == number]
-            kind, cosine = _called(whole.scene, rows, masses[rows], tuple(OWN))
+            kind, cosine = _best_name(whole.scene, rows, masses[rows], tuple(OWN))
             kinds.append(kind)
             cosines.append(cosine)
     return Parts(numbers, tuple(kinds), tuple(cosines), parts.present)
 
 
-def _called(
+def _best_name(
     scene: Scene, rows: Integer[np.ndarray, " n"], weights: Float[np.ndarray, " n"], names: Sequence[str]
 ) -> tuple[str, float]:
     """Which of some kinds rows of a scene answer best, and their mean cosine with it."""
@@ -310,7 +310,7 @@ def _thing(
     return Thing(
         id, kind, whole.scene.record.thing_names.get(id, ""), sure,
         *_box(whole, own, areas),
-        tuple(order), tuple(float(seen[view]) for view in order), _cut(whole, rows, order), rows,
+        tuple(order), tuple(float(seen[view]) for view in order), _is_cut_off(whole, rows, order), rows,
     )  # fmt: skip
 
 
@@ -347,7 +347,7 @@ def upright_box(
     return place, (float(width), float(depth), float(heights[1] - heights[0])), float(turn), float(heights[0])
 
 
-def _cut(whole: Inventory, rows: np.ndarray, views: Sequence[int]) -> bool:
+def _is_cut_off(whole: Inventory, rows: np.ndarray, views: Sequence[int]) -> bool:
     """Whether the photos that show it show it only up to their border."""
     means = whole.scene.gaussians.means.double().numpy()[rows]
     for view in views:

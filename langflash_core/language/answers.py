@@ -41,7 +41,7 @@ def answer(
     expected = (len(compiled.texts), *frame.alphas.shape)
     if tuple(relevance.shape) != expected:
         raise ValueError(f"relevance: expected {expected}, received {tuple(relevance.shape)}")
-    limit = compiled.threshold if threshold is None else _checked(threshold, compiled.mode)
+    limit = compiled.threshold if threshold is None else _check_threshold(threshold, compiled.mode)
     # Without atoms nothing can be there, whatever the threshold.
     covered = (frame.alphas >= ANSWERING.covered_alpha) & (compiled.factor.shape[0] > 0)  # (H, W)
     scores = presence_scores(relevance, covered)
@@ -154,16 +154,16 @@ def _one(text: str, score: float, limit: float, mask: Tensor, points: Tensor, va
         return PromptAnswer(text, False, score, limit, 0.0, None, None, mask=mask)
     x, y, z = weighted_centroid(points, values.clamp_min(0)).tolist()
     area = float(mask.float().mean())
-    box = oriented_box(_thinned(points))
+    box = oriented_box(_thin_points(points))
     return PromptAnswer(text, True, score, limit, area, (x, y, z), box, mask=mask)
 
 
-def _thinned(points: Tensor, most: int = 20_000) -> Tensor:
+def _thin_points(points: Tensor, most: int = 20_000) -> Tensor:
     """Every n-th point, at most about `most`: percentiles need no more."""
     return points[:: max(1, len(points) // most)]
 
 
-def _checked(threshold: float, mode: str) -> float:
+def _check_threshold(threshold: float, mode: str) -> float:
     low = 0.0 if mode == "relevancy" else -1.0
     if not low <= threshold <= 1.0:
         raise PromptError(f"the threshold {threshold} is out of range; {mode} needs {low:g} to 1")

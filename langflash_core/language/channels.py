@@ -37,14 +37,14 @@ class Decoder:
     out: Float[Tensor, "h C"]
 
     @staticmethod
-    def fitted(features: Float[Tensor, "n C"], channels: int) -> "Decoder":
+    def fit(features: Float[Tensor, "n C"], channels: int) -> "Decoder":
         """Least squares over unit vectors, with `DECODING.ridge` of their mean square on the output."""
         basis = principal(features, channels)
         generator = torch.Generator().manual_seed(channels)
         hidden = torch.randn(channels, DECODING.hidden, generator=generator)
         shift = 0.5 * torch.randn(DECODING.hidden, generator=generator)
         coded = features @ basis.T
-        units = _lit(coded, hidden, shift).double()
+        units = _hidden_activations(coded, hidden, shift).double()
         missing = (F.normalize(features, dim=-1) - F.normalize(coded, dim=-1) @ basis).double()
         normal = units.T @ units
         normal += DECODING.ridge * normal.diagonal().mean() * torch.eye(DECODING.hidden, dtype=torch.float64)
@@ -53,9 +53,12 @@ class Decoder:
     def __call__(self, coded: Float[Tensor, "*n d"]) -> Float[Tensor, "*n C"]:
         """Only the direction of z counts, so half covered pixels are decoded as covered ones; where z is 0
         nothing is drawn, and nothing said."""
-        said = F.normalize(coded, dim=-1) @ self.basis + _lit(coded, self.hidden, self.shift) @ self.out
+        said = (
+            F.normalize(coded, dim=-1) @ self.basis
+            + _hidden_activations(coded, self.hidden, self.shift) @ self.out
+        )
         return torch.where((coded != 0).any(-1, keepdim=True), said, 0.0)
 
 
-def _lit(coded: Tensor, hidden: Tensor, shift: Tensor) -> Tensor:
+def _hidden_activations(coded: Tensor, hidden: Tensor, shift: Tensor) -> Tensor:
     return F.relu(F.normalize(coded, dim=-1) @ hidden + shift)

@@ -99,7 +99,7 @@ def load_clip(source: str | None = None) -> ClipText:
     """
     path = _locate(source or os.environ.get("LANGFLASH_CLIP"))
     tower = build_clip()
-    state = {name: tensor for name, tensor in _read(path).items() if not name.startswith("visual.")}
+    state = {name: tensor for name, tensor in _read_state(path).items() if not name.startswith("visual.")}
     try:
         tower.model.load_state_dict(state)
     except (RuntimeError, AttributeError) as error:
@@ -119,7 +119,7 @@ def load_clip_images(source: str | None = None) -> ClipImages:
     open_clip = _open_clip()
     model = open_clip.CLIP(**open_clip.get_model_config(ARCHITECTURE))
     try:
-        model.load_state_dict(_read(path))
+        model.load_state_dict(_read_state(path))
     except (RuntimeError, AttributeError) as error:
         reason = " ".join(str(error).split())[:200]
         raise WeightsError(f"{path} does not hold all of CLIP ViT-B/32 ({reason}); {_remedy()}") from error
@@ -173,7 +173,7 @@ def _locate(source: str | None) -> Path:
         raise WeightsError(f"CLIP weights '{source}' could not be downloaded; {_remedy()}") from error
 
 
-def _read(path: Path) -> dict[str, Tensor]:
+def _read_state(path: Path) -> dict[str, Tensor]:
     """A state dict, never running code from the file."""
     open_clip = _open_clip()
     try:

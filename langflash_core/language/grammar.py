@@ -148,7 +148,7 @@ class Reading:
     @property
     def whole(self) -> bool:
         """Whether the phrase is asked as it stands."""
-        return not (self.modifiers or self.ignored) and self.head == unquoted(self.phrase)
+        return not (self.modifiers or self.ignored) and self.head == strip_quotes(self.phrase)
 
     @property
     def heads(self) -> tuple[str, ...]:
@@ -162,16 +162,16 @@ class Reading:
 
 def whole(phrase: str) -> Reading:
     """A phrase that is asked as it stands."""
-    return Reading(phrase, unquoted(phrase))
+    return Reading(phrase, strip_quotes(phrase))
 
 
-def unquoted(phrase: str) -> str:
+def strip_quotes(phrase: str) -> str:
     """A phrase without the quotes around it, if there are."""
     quoted = _QUOTED.fullmatch(phrase)
     return next(part for part in quoted.groups() if part) if quoted else phrase.strip()
 
 
-def read(phrase: str, taught: Collection[str] = ()) -> Reading:
+def read_phrase(phrase: str, taught: Collection[str] = ()) -> Reading:
     """How a phrase is understood; one that the grammar makes nothing of stays whole.
 
     Args:
@@ -193,7 +193,7 @@ def read(phrase: str, taught: Collection[str] = ()) -> Reading:
 
 def _phrase(plain: str, known: Collection[str]) -> Reading | None:
     """A phrase with what stands behind its noun; None where it has no head."""
-    for split in (_not_look, _tail, _related, _without):
+    for split in (_not_look, _tail, _read_relation, _without):
         found = split(plain, known)
         if found is not None:
             return found
@@ -222,7 +222,7 @@ def _tail(plain: str, known: Collection[str]) -> Reading | None:
     return _with(rest, Modifier("place", side, most=not _plural(found["rest"].split()[-1], known)))
 
 
-def _related(plain: str, known: Collection[str]) -> Reading | None:
+def _read_relation(plain: str, known: Collection[str]) -> Reading | None:
     """ "lamp above the table"; None without a relation between things that both are known."""
     found = _RELATION.fullmatch(plain)
     if found is None or (left := _noun(found["left"], known)) is None or not left.known:
@@ -267,18 +267,20 @@ def _noun(plain: str, known: Collection[str]) -> Reading | None:
             while start and _single(words[start - 1], known) and not _adjective(words[start - 1], True):
                 start -= 1  # "floor lamp": a name of two
                 head = f"{words[start]} {head}"
-            modifiers, ignored = _described(words[:start], _plural(words[-1], known))
+            modifiers, ignored = _read_adjectives(words[:start], _plural(words[-1], known))
             return Reading(plain, head, True, modifiers, ignored)
     kept = 0
-    while kept < len(words) and (_described(words[kept : kept + 1], False)[0] or words[kept] in _ARTICLES):
+    while kept < len(words) and (
+        _read_adjectives(words[kept : kept + 1], False)[0] or words[kept] in _ARTICLES
+    ):
         kept += 1
     if kept == len(words):
         return None
-    modifiers, ignored = _described(words[:kept], False)
+    modifiers, ignored = _read_adjectives(words[:kept], False)
     return Reading(plain, " ".join(words[kept:]), False, modifiers, ignored)
 
 
-def _described(words: list[str], several: bool) -> tuple[tuple[Modifier, ...], tuple[str, ...]]:
+def _read_adjectives(words: list[str], several: bool) -> tuple[tuple[Modifier, ...], tuple[str, ...]]:
     """What adjectives say, and those that say nothing that could be checked."""
     found, ignored, negated = list[Modifier](), list[str](), False
     for word in words:
@@ -314,7 +316,7 @@ def _adjective(word: str, several: bool) -> Modifier | None:
 
 def _looks(words: list[str]) -> tuple[Modifier, ...]:
     """The looks that some words are; none where one of them is something else."""
-    found, ignored = _described(words, False)
+    found, ignored = _read_adjectives(words, False)
     return () if ignored or any(each.kind != "look" for each in found) else found
 
 

@@ -46,7 +46,7 @@ def hint(phrase: str, taught: Collection[str] = ()) -> str:
     if plain in known.phrases or plain in {each.lower() for each in taught}:
         return ""
     own = frozenset(word for each in taught for word in _words(each))
-    return _negated(plain) or _misspelt(plain, own)
+    return _negation_hint(plain) or _misspelt(plain, own)
 
 
 def hints(scene: Scene | Semantics, phrases: Sequence[str]) -> tuple[str, ...]:
@@ -66,11 +66,11 @@ def reads_foreign(text: str) -> bool:
     them. Of 14 German, French, Spanish and Italian words for furniture that English does not have, all are
     told. Two English words in one are English ("typewriter").
     """
-    words = _counted(text)
-    return bool(words) and not any(_known(word) or _joined(word) for word in words)
+    words = _significant_words(text)
+    return bool(words) and not any(_is_known_word(word) or _is_compound(word) for word in words)
 
 
-def _negated(plain: str) -> str:
+def _negation_hint(plain: str) -> str:
     """What to write instead of a negation; "" where there is none."""
     try:
         if len(terms(plain)) > 1 or _SIGNS.search(plain):
@@ -108,11 +108,11 @@ def _more(beside: re.Match[str]) -> str:
 
 def _misspelt(plain: str, own: frozenset[str]) -> str:
     """The nearest household word of a slip; or which word is not known, where none of the phrase is."""
-    unknown = [word for word in _counted(plain) if not _known(word) and word not in own]
+    unknown = [word for word in _significant_words(plain) if not _is_known_word(word) and word not in own]
     for word in unknown:
         if near := _nearest(word, own):
             return f'"{word}" is not a word this model knows; did you mean "{near}"?'
-    if unknown and reads_foreign(plain) and not own.intersection(_counted(plain)):
+    if unknown and reads_foreign(plain) and not own.intersection(_significant_words(plain)):
         return f'"{unknown[0]}" is not a word this model knows well; try a more common word, in English'
     return ""
 
@@ -121,19 +121,19 @@ def _words(text: str) -> list[str]:
     return re.findall(r"[^\W\d_]{3,}", text.lower())
 
 
-def _counted(text: str) -> list[str]:
+def _significant_words(text: str) -> list[str]:
     """Its longer words; shorter ones, articles among them, only where there is no other."""
     words = _words(text)
     return [word for word in words if len(word) >= HINTS.shortest] or words
 
 
-def _known(word: str) -> bool:
+def _is_known_word(word: str) -> bool:
     there, ours = load_minilm().tokenizer.token_to_id, _household().words
     stems = (word, *(word.removesuffix(end) for end in _ENDINGS if len(word) - len(end) >= HINTS.shortest))
     return any(there(stem) is not None or stem in ours for stem in stems)
 
 
-def _joined(word: str) -> bool:
+def _is_compound(word: str) -> bool:
     """Whether it is two words of the text model in one."""
     there = load_minilm().tokenizer.token_to_id
     cuts = range(HINTS.shortest, len(word) - HINTS.shortest + 1)

@@ -134,7 +134,7 @@ def read_lessons(path: Path) -> Lessons:
     readable_file(path, "vocabulary", PromptError)
     TEXT.check(path.stat().st_size, path.name, PromptError)
     try:
-        return _parsed(json.loads(path.read_bytes()))
+        return _parse(json.loads(path.read_bytes()))
     except (ValueError, TypeError, KeyError, AttributeError, RecursionError) as error:
         why = " ".join(str(error).split())[:120]
         raise PromptError(
@@ -142,7 +142,7 @@ def read_lessons(path: Path) -> Lessons:
         ) from error
 
 
-def _parsed(document: Any) -> Lessons:
+def _parse(document: Any) -> Lessons:
     if document["format"] != FORMAT or document["version"] != VERSION:
         raise ValueError(f"expected format {FORMAT!r}, version {VERSION}")
     rows, network = document["lessons"], document["network"]

@@ -65,7 +65,7 @@ class MiniLM(nn.Module):
             self.layers = nn.ModuleList(_layer() for _ in range(MINILM.layers))
         self.load_state_dict(_state(tensors), strict=False, assign=True)
         self.requires_grad_(False).eval()
-        self.tokenizer = _prepared(tokenizer)
+        self.tokenizer = _prepare_tokenizer(tokenizer)
 
     def encode(self, texts: Sequence[str]) -> Float[Tensor, "P 384"]:
         """Unit embeddings (P, 384) float32 of P phrases; P may be 0.
@@ -82,7 +82,7 @@ class MiniLM(nn.Module):
         with torch.no_grad():
             for start in range(0, len(tokens), MINILM.batch):
                 chosen = by_length[start : start + MINILM.batch]
-                embeddings[chosen] = self(*_padded([tokens[i] for i in chosen]))
+                embeddings[chosen] = self(*_pad_tokens([tokens[i] for i in chosen]))
         return embeddings
 
     def tokens(self, text: str) -> list[int]:
@@ -163,14 +163,14 @@ def _layer() -> nn.TransformerEncoderLayer:
     )
 
 
-def _prepared(tokenizer: Tokenizer) -> Tokenizer:
-    """Cut at 256 tokens, and no padding: batches are padded by `_padded` alone."""
+def _prepare_tokenizer(tokenizer: Tokenizer) -> Tokenizer:
+    """Cut at 256 tokens, and no padding: batches are padded by `_pad_tokens` alone."""
     tokenizer.enable_truncation(MINILM.max_tokens)
     tokenizer.no_padding()
     return tokenizer
 
 
-def _padded(tokens: list[list[int]]) -> tuple[Tensor, Tensor]:
+def _pad_tokens(tokens: list[list[int]]) -> tuple[Tensor, Tensor]:
     """Ids (B, T) filled with 0 and the mask (B, T) of real tokens."""
     longest = max(len(ids) for ids in tokens)
     ids = torch.tensor([row + [0] * (longest - len(row)) for row in tokens])

@@ -20,7 +20,7 @@ from langflash_core.language.grammar import Modifier, Reading
 from langflash_core.language.looks import LOOKS, lab, looking, room_white
 from langflash_core.language.relevance import CompiledQuery
 from langflash_core.language.settings import ANSWERING, NARROWING
-from langflash_core.language.things import AWAY, UP, Thing, gap, related
+from langflash_core.language.things import AWAY, UP, Thing, gap, is_related
 from langflash_core.types import Camera, Frame
 
 
@@ -120,7 +120,7 @@ def _relating(things: list[Thing], modifier: Modifier, sight: Sight, head: str) 
     if modifier.word in ("nearest to", "farthest from"):
         sign = 1 if modifier.word == "nearest to" else -1
         return [min(things, key=lambda each: sign * gap(each, others[0]))], ""
-    found = [each for each in things if related(each, modifier.word, others) != modifier.negated]
+    found = [each for each in things if is_related(each, modifier.word, others) != modifier.negated]
     return found, "" if found else f"no {head} here is {modifier}"
 
 
@@ -230,12 +230,12 @@ def narrow_view(
         if others is None or compiled.others is None
         else dict(zip(compiled.others.texts, others, strict=True))
     )
-    related_to = {head: view.picked(own) for head, own in named.items()}
+    related_to = {head: view.pick_samples(own) for head, own in named.items()}
     told = compiled.notes or ("",) * len(limits)
     for row, (reading, limit) in enumerate(zip(compiled.readings, limits, strict=True)):
         note = ""
         if reading.narrows:
-            by_head = {**related_to, reading.head: view.picked(relevance[row])}
+            by_head = {**related_to, reading.head: view.pick_samples(relevance[row])}
             choice = choose(reading, view.sight(by_head, limit, likely(limit, compiled.mode)))
             note = choice.note
             if choice.dropped:
@@ -277,7 +277,7 @@ class _View:
             lab(rgb, room_white(rgb)),
         )
 
-    def picked(self, values: Float[Tensor, "H W"]) -> Float[np.ndarray, " n"]:
+    def pick_samples(self, values: Float[Tensor, "H W"]) -> Float[np.ndarray, " n"]:
         some = slice(self.step // 2, None, self.step)
         return values.cpu().numpy()[some, some][self.shown]
 

@@ -155,7 +155,7 @@ def compile_query(
     vectors = encode_prompts(space, texts).to(basis)
     judged = vectors @ basis.T
     if mode == "relevancy":
-        judged = judged + _in_factor(factor, rivalled(dictionary, space, texts, vectors))
+        judged = judged + _in_factor(factor, rival_terms(dictionary, space, texts, vectors))
     return CompiledQuery(
         factor=factor,
         prompts=judged,
@@ -169,7 +169,7 @@ def compile_query(
     )
 
 
-def rivalled(
+def rival_terms(
     dictionary: Float[Tensor, "K C"],
     space: LanguageSpace,
     texts: Sequence[str],

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 from langflash_core.errors import PromptError
-from langflash_core.language.grammar import Reading, read
+from langflash_core.language.grammar import Reading, read_phrase
 from langflash_core.language.hints import hints
 from langflash_core.language.relevance import CompiledQuery, Mode, compile_query
 from langflash_core.language.settings import SPOKEN
@@ -30,7 +30,7 @@ def compile_spoken(
     if isinstance(prompts, str):
         raise PromptError("there is no prompt; give a list with at least one word or short phrase")
     taught = tuple(scene.record.atom_names.values()) if isinstance(scene, Scene) else ()
-    readings = tuple(read(prompt, taught) for prompt in prompts)
+    readings = tuple(read_phrase(prompt, taught) for prompt in prompts)
     heads = [reading.head for reading in readings]
     compiled = compile_query(scene, space, heads, negatives=negatives, mode=mode)
     told = tuple(prompt.strip() for prompt in prompts)
@@ -43,22 +43,24 @@ def compile_spoken(
     return replace(compiled, texts=told, notes=notes, readings=readings, others=others)
 
 
-def told(scene: Scene | Semantics, prompts: Sequence[str], *, narrowing: bool = True) -> tuple[str, ...]:
+def phrase_notes(
+    scene: Scene | Semantics, prompts: Sequence[str], *, narrowing: bool = True
+) -> tuple[str, ...]:
     """What people should know of phrases before they are answered, or "".
 
     Args:
         narrowing: whether what answers them chooses among what answers their heads.
     """
     taught = tuple(scene.record.atom_names.values()) if isinstance(scene, Scene) else ()
-    readings = [read(prompt, taught) for prompt in prompts]
+    readings = [read_phrase(prompt, taught) for prompt in prompts]
     said = hints(scene, [reading.head for reading in readings])
     return tuple(
-        "; ".join(filter(None, (hint, _unread(reading), "" if narrowing else _widened(reading))))
+        "; ".join(filter(None, (hint, _unread(reading), "" if narrowing else _widening_note(reading))))
         for reading, hint in zip(readings, said, strict=True)
     )
 
 
-def _widened(reading: Reading) -> str:
+def _widening_note(reading: Reading) -> str:
     return f'this shows every "{reading.head}", not only "{reading}"' if reading.narrows else ""
 
 

@@ -35,16 +35,18 @@ def taught_dictionary(
     Raises:
         WeightsError: the space has no text weights.
     """
-    lessons = {k: (record.atom_names.get(k, ""), record.atom_denials.get(k, ())) for k in _taught(record)}
+    lessons = {
+        k: (record.atom_names.get(k, ""), record.atom_denials.get(k, ())) for k in _taught_atoms(record)
+    }
     texts = dict.fromkeys(text for name, denied in lessons.values() for text in (name, *denied))
-    known = {text: row.to(dictionary) for text in texts if (row := _encoded(space, text)) is not None}
+    known = {text: row.to(dictionary) for text in texts if (row := _encode_phrase(space, text)) is not None}
     lessons = {k: (name, denied) for k, (name, denied) in lessons.items() if {name, *denied} & known.keys()}
     if not lessons:
         return dictionary
     rows = torch.tensor(list(lessons), device=dictionary.device)
     before = dictionary[rows]
     after = torch.stack(
-        [_moved(dictionary[k], *lesson, known, k in record.lone_atoms) for k, lesson in lessons.items()]
+        [_move_atom(dictionary[k], *lesson, known, k in record.lone_atoms) for k, lesson in lessons.items()]
     )
     unit = normalize(dictionary, dim=-1)
     shares = ((unit @ unit[rows].T - TEACHING.alike) / (1 - TEACHING.alike)).clamp(0, 1)
@@ -55,11 +57,11 @@ def taught_dictionary(
     return torch.where(moved, spread, dictionary).index_copy(0, rows, after)
 
 
-def _taught(record: Record) -> list[int]:
+def _taught_atoms(record: Record) -> list[int]:
     return sorted({*record.atom_names, *record.atom_denials})
 
 
-def _encoded(space: LanguageSpace, text: str) -> Tensor | None:
+def _encode_phrase(space: LanguageSpace, text: str) -> Tensor | None:
     """A plain phrase (C,), also where it reads like a sum of others (`algebra`); None for one without a word
     that the tower knows, as people name things."""
     try:
@@ -68,7 +70,9 @@ def _encoded(space: LanguageSpace, text: str) -> Tensor | None:
         return None
 
 
-def _moved(atom: Tensor, name: str, denied: Sequence[str], known: Mapping[str, Tensor], lone: bool) -> Tensor:
+def _move_atom(
+    atom: Tensor, name: str, denied: Sequence[str], known: Mapping[str, Tensor], lone: bool
+) -> Tensor:
     """An atom (C,) after its own lesson; 0 where nothing of it is left."""
     if name in known:
         atom = normalize(normalize(atom, dim=0) + known[name], dim=0)

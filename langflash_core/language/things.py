@@ -100,7 +100,7 @@ def together(things: list[Thing]) -> Float[np.ndarray, "n 3"]:
     return places[:: max(1, len(places) // RELATIONS.most_of_all)]
 
 
-def related(thing: Thing, relation: str, others: list[list[Thing]]) -> bool:
+def is_related(thing: Thing, relation: str, others: list[list[Thing]]) -> bool:
     """Whether a thing stands in a relation of the grammar's to some of these.
 
     Args:
@@ -202,7 +202,7 @@ def _inside(thing: Thing, other: Thing) -> bool:
     return bool(((thing.middle >= other.low - slack) & (thing.middle <= other.high + slack)).all())
 
 
-def _left(thing: Thing, other: Thing) -> bool:
+def _is_left_of(thing: Thing, other: Thing) -> bool:
     return thing.column < other.columns[0] + 0.1 * (other.columns[1] - other.columns[0])
 
 
@@ -237,6 +237,6 @@ _PAIRS = {
     "beside": _beside,
     "in front of": _before,
     "behind": lambda thing, other: _before(other, thing),
-    "left of": _left,
+    "left of": _is_left_of,
     "right of": _right,
 }

@@ -2,7 +2,7 @@
 
 `OWN` holds words that mean one group: synonyms, kinds, short descriptions. `BROADER` holds words
 that are true of several groups; they are complete, so that such a phrase is false of every other
-group of the table. `EVALUATED` is asked by the evaluation and never taught: `taught` refuses it.
+group of the table. `EVALUATED` is asked by the evaluation and never taught: `is_trainable` refuses it.
 
 Synonyms and hypernyms were looked up in WordNet 3.0 (Princeton University) and chosen by hand.
 """
@@ -348,7 +348,7 @@ def content(phrase: str) -> frozenset[str]:
 _KEPT_BACK = frozenset(content(phrase) for phrase in EVALUATED)
 
 
-def taught(phrase: str) -> bool:
+def is_trainable(phrase: str) -> bool:
     """Whether a phrase may be trained on: not one of `EVALUATED`, whatever its articles."""
     return content(phrase) not in _KEPT_BACK
 

@@ -16,14 +16,14 @@ from langflash_core.geometry.harmonics import SH_C0
 from langflash_core.meant import answering
 from langflash_core.mending.settings import CLEANING
 from langflash_core.scene.instances import disc_radii
-from langflash_core.scene.joining import appended
+from langflash_core.scene.joining import append_part
 from langflash_core.splat.visibility import seen_shares
 from langflash_core.types import Scene
 
 from .filling import fill
 from .looks import Render
 from .recipes import COLOUR, Box, Recipe, Rule
-from .strength import chosen, kind_strengths
+from .strength import choose_removed, kind_strengths
 
 _ALL = "everything else"
 
@@ -36,7 +36,7 @@ class Cleaned:
     counts: Mapping[str, int]
 
 
-def cleaned(scene: Scene, recipe: Recipe) -> Cleaned:
+def apply_recipe(scene: Scene, recipe: Recipe) -> Cleaned:
     """What of a scene a recipe takes away.
 
     Raises:
@@ -48,16 +48,16 @@ def cleaned(scene: Scene, recipe: Recipe) -> Cleaned:
     reasons: dict[str, Bool[np.ndarray, " N"]] = {}
     if recipe.strength:
         found = kind_strengths(scene, every, recipe.kinds)
-        reasons = {kind: chosen(least, recipe.strength) for kind, least in found.items()}
+        reasons = {kind: choose_removed(least, recipe.strength) for kind, least in found.items()}
     for rule in recipe.rules:
-        reasons[_said(rule)] = meeting(scene, rule)
+        reasons[_describe_rule(rule)] = meeting(scene, rule)
     reasons = {name: rows & scope for name, rows in reasons.items()}
     if recipe.invert:
         found = np.logical_or.reduce([~every, *reasons.values()])
         reasons = {_ALL: scope & ~found}
     if recipe.crop is not None:
         reasons["outside the box"] = ~inside(scene, box_of(scene, recipe.crop, every))
-    return _counted(reasons, len(every))
+    return _count_reasons(reasons, len(every))
 
 
 def taken_out(scene: Scene, rows: Bool[np.ndarray, " N"], fill_with: Render | None = None) -> Scene:
@@ -70,7 +70,7 @@ def taken_out(scene: Scene, rows: Bool[np.ndarray, " N"], fill_with: Render | No
         raise InputError("nothing would be left of the scene; choose less")
     gone = torch.from_numpy(rows)
     left = scene.rows(~gone).with_record(num_deleted=scene.record.num_deleted + int(rows.sum()))
-    return left if fill_with is None or not rows.any() else appended(left, fill(scene, gone, fill_with))
+    return left if fill_with is None or not rows.any() else append_part(left, fill(scene, gone, fill_with))
 
 
 def box_of(scene: Scene, crop: str | Box, visible: Bool[np.ndarray, " N"]) -> Box:
@@ -103,7 +103,7 @@ def meeting(
     """Gaussians of which all conditions of a rule hold.
 
     Args:
-        measure: `measured` of the scene by name, where they are remembered; None: measured here.
+        measure: `measure_gaussians` of the scene by name, where they are remembered; None: measured here.
 
     Raises:
         InputError: the scene does not know what a condition asks for.
@@ -115,12 +115,12 @@ def meeting(
             colours = 0.5 + SH_C0 * scene.gaussians.sh[:, 0].detach().cpu().double().numpy()
             rows &= (abs(colours - shade) <= off).all(1)
             continue
-        values, (low, high) = measured(scene, name) if measure is None else measure(name), limits
+        values, (low, high) = measure_gaussians(scene, name) if measure is None else measure(name), limits
         rows &= (values > (-np.inf if low is None else low)) & (values < (np.inf if high is None else high))
     return rows
 
 
-def measured(scene: Scene, name: str) -> Float[np.ndarray, " N"]:
+def measure_gaussians(scene: Scene, name: str) -> Float[np.ndarray, " N"]:
     """One of `MEASURES` of each Gaussian, in its units.
 
     Raises:
@@ -144,7 +144,7 @@ def measured(scene: Scene, name: str) -> Float[np.ndarray, " N"]:
     return scene.confidences.cpu().double().numpy()
 
 
-def _said(rule: Rule) -> str:
+def _describe_rule(rule: Rule) -> str:
     """A rule for people."""
     parts = []
     for name, limits in rule.items():
@@ -157,7 +157,7 @@ def _said(rule: Rule) -> str:
     return " and ".join(parts)
 
 
-def _counted(reasons: Mapping[str, Bool[np.ndarray, " N"]], count: int) -> Cleaned:
+def _count_reasons(reasons: Mapping[str, Bool[np.ndarray, " N"]], count: int) -> Cleaned:
     """All of them, each counted for the first reason."""
     rows, counts = np.zeros(count, bool), {}
     for name, found in reasons.items():

@@ -26,7 +26,7 @@ from torch import Tensor
 from langflash_core.errors import InputError
 from langflash_core.geometry.cameras import invert_rigid
 from langflash_core.mending.settings import CLONING
-from langflash_core.scene.changed import changed
+from langflash_core.scene.changed import apply_changes
 from langflash_core.scene.changes import UNTURNED, Moved, Spot, Turn, turn_about, turn_matrix
 from langflash_core.scene.mask import Mask
 from langflash_core.scene.selection import spacing
@@ -48,7 +48,7 @@ class Stroke:
     start: tuple[float, float]
     radius: float
 
-    def grown(self, around: float) -> Bool[np.ndarray, "H W"]:
+    def dilate(self, around: float) -> Bool[np.ndarray, "H W"]:
         """The pixels with all within so many of them."""
         reach = math.ceil(around)
         disc = cv2.getStructuringElement(cv2.MORPH_ELLIPSE, (2 * reach + 1, 2 * reach + 1))
@@ -56,7 +56,7 @@ class Stroke:
 
     def holds(self, centres: Float[np.ndarray, "n 2"], around: float = 0.0) -> Bool[np.ndarray, " n"]:
         """Whether places in the picture, NaN for none, are in the pixels or so many beside them."""
-        mask = self.grown(around)
+        mask = self.dilate(around)
         x, y = np.floor(np.nan_to_num(centres, nan=-1.0)).T
         inside = (x >= 0) & (y >= 0) & (x < mask.shape[1]) & (y < mask.shape[0])
         return inside & mask[np.where(inside, y, 0).astype(int), np.where(inside, x, 0).astype(int)]
@@ -101,12 +101,12 @@ def clone(
     """
     rows = visible.cpu().bool() & drawable_rows(scene)
     shown = scene.rows(rows)
-    seen = _seen(shown, stroke, render)
+    seen = _visible_surface(shown, stroke, render)
     surface = _surface(seen, stroke)
-    near, move = _moved(seen.points, np.array(source), surface, stroke.radius, fit)
+    near, move = _move_to_stroke(seen.points, np.array(source), surface, stroke.radius, fit)
     part = _of_all_layers(shown.rows(torch.from_numpy(near)))
     move = replace(move, rows=Mask.full(len(part.gaussians)))
-    laid = _lifted(changed(part.gaussians, (move,)), surface)
+    laid = _lift_to_surface(apply_changes(part.gaussians, (move,)), surface)
     here = torch.from_numpy(stroke.holds(_centres(laid, stroke.camera), CLONING.rim))
     if not here.any():
         raise InputError("nothing lies round the source where the brush would copy it; choose another source")
@@ -114,7 +114,7 @@ def clone(
     if copies.confidences is not None:
         copies = replace(copies, confidences=torch.zeros_like(copies.confidences))
     gone = torch.zeros(len(rows), dtype=torch.bool)
-    gone[rows] = torch.from_numpy(_covered(seen, surface, stroke))
+    gone[rows] = torch.from_numpy(_covered_gaussians(seen, surface, stroke))
     return copies, gone
 
 
@@ -143,14 +143,14 @@ class _Seen:
     layered: bool
 
 
-def _seen(shown: Scene, stroke: Stroke, render: Render) -> _Seen:
+def _visible_surface(shown: Scene, stroke: Stroke, render: Render) -> _Seen:
     camera, gaussians = stroke.camera, shown.gaussians.map(lambda values: values.detach().cpu().double())
     points, viewmat = gaussians.means.numpy(), camera.viewmat.cpu().double().numpy()
     depths, centres = points @ viewmat[2, :3] + viewmat[2, 3], _centres(gaussians, camera)
     alphas = render(shown, camera, weight_maps=False).alphas.cpu().numpy()[stroke.pixels]
     closed = bool(alphas.size) and float((alphas >= CLONING.half).mean()) >= CLONING.half
     for around in (0.0, 2 * stroke.radius):
-        seen = seen_in(shown, np.ones(len(points), bool), camera, stroke.grown(around))
+        seen = seen_in(shown, np.ones(len(points), bool), camera, stroke.dilate(around))
         here = seen & stroke.holds(centres, around)
         if closed and here.sum() >= CLONING.nearest:
             break
@@ -206,7 +206,7 @@ def _surface(seen: _Seen, stroke: Stroke) -> _Surface:
     return _Surface(plane, flat, heights[on_it], start, unit, far, spacing(points[on_it]), eye)
 
 
-def _covered(seen: _Seen, surface: _Surface, stroke: Stroke) -> Bool[np.ndarray, " N"]:
+def _covered_gaussians(seen: _Seen, surface: _Surface, stroke: Stroke) -> Bool[np.ndarray, " N"]:
     """What lies on the surface in the pixels, and what is seen there before it; of layers, all of that."""
     inside, found = stroke.holds(seen.centres), np.zeros(len(seen.points), bool)
     points, slack = seen.points[inside], 2 * CLONING.far * seen.depths[inside]
@@ -215,7 +215,7 @@ def _covered(seen: _Seen, surface: _Surface, stroke: Stroke) -> Bool[np.ndarray,
     return found
 
 
-def _moved(
+def _move_to_stroke(
     points: Float[np.ndarray, "N 3"],
     source: Float[np.ndarray, " 3"],
     surface: _Surface,
@@ -242,7 +242,7 @@ def _moved(
     return near, Moved(Mask.full(int(near.sum())), turn, scale, _spot(offset))
 
 
-def _lifted(laid: Gaussians, surface: _Surface) -> Gaussians:
+def _lift_to_surface(laid: Gaussians, surface: _Surface) -> Gaussians:
     """Gaussians on the surface instead of on its plane."""
     if not len(laid):
         return laid

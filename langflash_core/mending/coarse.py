@@ -24,7 +24,7 @@ from langflash_core.geometry.harmonics import SH_C0, colour_to_sh
 from langflash_core.geometry.quaternions import matrices_to_quats
 from langflash_core.mending.settings import COARSENING
 from langflash_core.scene.thin import covered_areas
-from langflash_core.scene.weights import renormalised, sparse_weights
+from langflash_core.scene.weights import renormalise, sparse_weights
 from langflash_core.types import Gaussians, Scene, Semantics
 
 
@@ -38,7 +38,7 @@ class _Blocks:
     side: float
 
 
-def coarsened(part: Scene, side: float, *, squares: bool) -> Scene:
+def coarsen(part: Scene, side: float, *, squares: bool) -> Scene:
     """The part of a scene as blocks of a side, scene units.
 
     Args:
@@ -71,11 +71,11 @@ def coarsened(part: Scene, side: float, *, squares: bool) -> Scene:
         semantics=_semantics(part, areas, cube, len(cells), of),
         view_ids=None if views is None else _a_view(part, cube, len(cells))[of],
         levels=None if part.levels is None else torch.zeros(len(of), dtype=torch.uint8),
-        confidences=None if sure is None else quantised(mean(sure[:, None])[of, 0]).float(),
+        confidences=None if sure is None else quantise_colours(mean(sure[:, None])[of, 0]).float(),
     )
 
 
-def quantised(colours: Tensor) -> Tensor:
+def quantise_colours(colours: Tensor) -> Tensor:
     """Colours in [0, 1], each channel one of `COARSENING.levels`."""
     return (colours.clamp(0, 1) * (COARSENING.levels - 1)).round() / (COARSENING.levels - 1)
 
@@ -96,7 +96,7 @@ def _blocks(
 ) -> _Blocks:
     step = side / COARSENING.places
     means = ((mean(gaussians.means) / step).floor() + 0.5) * step
-    colours = quantised(mean(0.5 + SH_C0 * gaussians.sh[:, 0]))
+    colours = quantise_colours(mean(0.5 + SH_C0 * gaussians.sh[:, 0]))
     return _Blocks(means, colours, _axes(means, cells), side)
 
 
@@ -158,7 +158,7 @@ def _semantics(part: Scene, areas: Tensor, cube: np.ndarray, num_blocks: int, of
     carried = (semantics.weight_values.double() * areas[:, None]).flatten()
     sums = torch.zeros(num_blocks * count, dtype=torch.float64).index_add(0, flat.flatten(), carried)
     ids, values = sparse_weights(sums.view(num_blocks, count).float(), most)
-    values = renormalised((values * (COARSENING.levels - 1)).round())
+    values = renormalise((values * (COARSENING.levels - 1)).round())
     return replace(semantics, weight_ids=ids[of], weight_values=values[of])
 
 

@@ -29,14 +29,14 @@ from langflash_core.geometry.quaternions import matrices_to_quats
 from langflash_core.geometry.surfels import ellipses, spans
 from langflash_core.mending.settings import FILLING
 from langflash_core.rig.projected import project_points
-from langflash_core.scene.joining import appended
+from langflash_core.scene.joining import append_part
 from langflash_core.scene.weights import sparse_weights
 from langflash_core.surface.settings import EXPOSURE
 from langflash_core.types import Camera, Gaussians, Scene
 
 from .looks import Render, mattes
 from .planes import Plane, planes
-from .texture import healed, spread
+from .texture import diffuse, heal
 
 _BRIGHTEST = EXPOSURE.gain_range[1] + EXPOSURE.largest_offset  # a photo's white in the scene's light
 
@@ -91,12 +91,12 @@ def fill(scene: Scene, removed: Tensor, render: Render) -> Scene:
         return none
     flat, rest = _on_planes(views, _planes_around(views), none)
     for view, missing in zip(views, rest, strict=True):
-        flat = appended(flat, _bent(view, missing, appended(left, flat), render, none))
+        flat = append_part(flat, _fill_smoothly(view, missing, append_part(left, flat), render, none))
     return flat
 
 
 def _views(scene: Scene, left: Scene, removed: Tensor, render: Render) -> list[_View]:
-    cameras = [_resized(scene.camera(view)) for view in range(scene.num_views)]
+    cameras = [_resize_camera(scene.camera(view)) for view in range(scene.num_views)]
     shown = mattes(scene, removed, cameras, render)
     order = sorted(range(len(cameras)), key=lambda view: -float(shown[view][0].sum()))[: FILLING.most_views]
     found = [
@@ -107,10 +107,10 @@ def _views(scene: Scene, left: Scene, removed: Tensor, render: Render) -> list[_
     return [view for view in found if view.hole.sum() >= FILLING.least]
 
 
-def _resized(camera: Camera) -> Camera:
+def _resize_camera(camera: Camera) -> Camera:
     longer = max(camera.width, camera.height)
     ratio = min(FILLING.finer, max(1, FILLING.most_side / longer))
-    return camera.resized(max(1, round(camera.width * ratio)), max(1, round(camera.height * ratio)))
+    return camera.with_size(max(1, round(camera.width * ratio)), max(1, round(camera.height * ratio)))
 
 
 def _view(left: Scene, camera: Camera, matte: Tensor, before: Tensor, number: int, render: Render) -> _View:
@@ -155,18 +155,18 @@ def _on_planes(
     views: Sequence[_View], found: Sequence[Plane], none: Scene
 ) -> tuple[Scene, list[Bool[np.ndarray, "H W"]]]:
     """The patches of all planes, and the pixels of each view's hole that no plane lies around."""
-    chosen = [_chosen(view, found) for view in views]
+    chosen = [_choose_planes(view, found) for view in views]
     flat = none
     for number, plane in enumerate(found):
         spots = [
             view.points(depth)[which == number] for view, (which, depth) in zip(views, chosen, strict=True)
         ]
         if sum(map(len, spots)):
-            flat = appended(flat, _patch(plane, np.concatenate(spots), views, none))
+            flat = append_part(flat, _patch(plane, np.concatenate(spots), views, none))
     return flat, [view.hole & (which < 0) for view, (which, _) in zip(views, chosen, strict=True)]
 
 
-def _chosen(
+def _choose_planes(
     view: _View, found: Sequence[Plane]
 ) -> tuple[Integer[np.ndarray, "H W"], Float[np.ndarray, "H W"]]:
     """The plane that each pixel of the hole shows, -1 for none, and its depth there."""
@@ -204,13 +204,13 @@ def _patch(plane: Plane, spots: Float[np.ndarray, "n 3"], views: Sequence[_View]
     along = low + pitch * (np.stack((columns, rows), -1) + 0.5)
     points = along @ basis + plane.normal * plane.offset  # (h, w, 3)
     on_it = FILLING.far * min(max(FILLING.noise * plane.noise, FILLING.narrowest), 2.0)
-    colours, weights, known, through = _seen(points.reshape(-1, 3), views, on_it)
+    colours, weights, known, through = _sample_views(points.reshape(-1, 3), views, on_it)
     known = known if weights is None else known & _common(weights, known)
     known, through = (each.reshape(shape) for each in (known, through))
-    hole &= ~through & ~_covered(points.reshape(-1, 3), views).reshape(shape)
+    hole &= ~through & ~_is_covered(points.reshape(-1, 3), views).reshape(shape)
     if not hole.any():
         return none
-    coloured = healed(colours.reshape(*shape, 3), known, hole)
+    coloured = heal(colours.reshape(*shape, 3), known, hole)
     nearest = np.zeros((2, *shape), int)
     if known.any():
         nearest = np.asarray(
@@ -248,7 +248,7 @@ def _common(weights: Float[np.ndarray, "n K"], known: Bool[np.ndarray, " n"]) ->
     return (counts >= FILLING.rare * counts.max())[groups]
 
 
-def _covered(points: Float[np.ndarray, "n 3"], views: Sequence[_View]) -> Bool[np.ndarray, " n"]:
+def _is_covered(points: Float[np.ndarray, "n 3"], views: Sequence[_View]) -> Bool[np.ndarray, " n"]:
     """Points where some view shows a surface just there."""
     found = np.zeros(len(points), bool)
     for view in views:
@@ -258,7 +258,7 @@ def _covered(points: Float[np.ndarray, "n 3"], views: Sequence[_View]) -> Bool[n
     return found
 
 
-def _seen(
+def _sample_views(
     points: Float[np.ndarray, "n 3"], views: Sequence[_View], on_it: float
 ) -> tuple[
     Float[np.ndarray, "n 3"], Float[np.ndarray, "n K"] | None, Bool[np.ndarray, " n"], Bool[np.ndarray, " n"]
@@ -286,7 +286,9 @@ def _seen(
     return colours, weights, known, through
 
 
-def _bent(view: _View, missing: Bool[np.ndarray, "H W"], sofar: Scene, render: Render, none: Scene) -> Scene:
+def _fill_smoothly(
+    view: _View, missing: Bool[np.ndarray, "H W"], sofar: Scene, render: Render, none: Scene
+) -> Scene:
     """Pixels that no plane lies around, on a surface that runs smoothly from their edge to their edge."""
     if missing.sum() < FILLING.least:
         return none
@@ -298,7 +300,7 @@ def _bent(view: _View, missing: Bool[np.ndarray, "H W"], sofar: Scene, render: R
         return none
     straight = (frame.rgb.cpu().numpy() / np.maximum(alphas, 1 / 255)[..., None]).clip(0, _BRIGHTEST)
     inverse = np.repeat((1 / np.maximum(depths, 1e-9))[..., None], 3, -1)
-    depth = torch.from_numpy(1 / np.maximum(spread(inverse, known)[..., 0], 1e-9))
+    depth = torch.from_numpy(1 / np.maximum(diffuse(inverse, known)[..., 0], 1e-9))
     points = unproject(depth, view.camera.K.cpu().double())
     footprint = depth / float(view.camera.K[0, 0])
     axes, sizes = ellipses(*spans(points, footprint))
@@ -308,7 +310,7 @@ def _bent(view: _View, missing: Bool[np.ndarray, "H W"], sofar: Scene, render: R
     carried = None if view.weights is None else view.weights[nearest[0][missing], nearest[1][missing]]
     return _elements(
         none, transform(pose, points[rows]).numpy(), (pose[:3, :3] @ axes[rows]).numpy(),
-        FILLING.cover * sizes[rows].clamp_min(1e-6).numpy(), spread(straight, known)[missing],
+        FILLING.cover * sizes[rows].clamp_min(1e-6).numpy(), diffuse(straight, known)[missing],
         carried, view.number,
     )  # fmt: skip
 

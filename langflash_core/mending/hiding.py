@@ -24,14 +24,14 @@ from langflash_core.errors import InputError
 from langflash_core.mending.settings import HIDING, RECIPE_DEFAULTS
 from langflash_core.rig.projected import project_points
 from langflash_core.scene.instances import instances
-from langflash_core.scene.joining import appended
+from langflash_core.scene.joining import append_part
 from langflash_core.surface.prune import sparser
 from langflash_core.types import Camera, Scene
 
-from .coarse import coarsened
+from .coarse import coarsen
 from .filling import fill
 from .looks import Progress, Render, mattes
-from .photos import grown, not_in_scene, painted_over, reaches, with_photos, without_photos
+from .photos import dilate_mask, not_in_scene, painted_over, reaches, with_photos, without_photos
 
 How = Literal["blur", "pixels", "remove"]
 
@@ -104,18 +104,18 @@ def hide(
     if not bool(members.any()):
         raise InputError("nothing was chosen to be hidden; name or select something that is there")
     told("looking", 0.1)
-    masks, rows = _masked(scene, members, hiding.margin, render)
+    masks, rows = _mask_views(scene, members, hiding.margin, render)
     side = 0.0 if hiding.how == "remove" else _block_side(scene, members, hiding.blocks)
     told("hiding", 0.3)
-    kept, names = _unnamed(scene, rows)
+    kept, names = _remove_names(scene, rows)
     kept = kept.rows(~rows)
     if hiding.how != "remove":
-        made = coarsened(scene.rows(rows), side, squares=hiding.how == "pixels")
+        made = coarsen(scene.rows(rows), side, squares=hiding.how == "pixels")
     elif hiding.filled:
         made = fill(scene, rows, render)
     else:
         made = kept.rows(torch.zeros(0, dtype=torch.int64))
-    done = appended(kept, made).with_record(others={})
+    done = append_part(kept, made).with_record(others={})
     told("photos", 0.6)
     if hiding.photos:
         masks = [mask | _transients(scene, view, hiding, render) for view, mask in enumerate(masks)]
@@ -134,16 +134,18 @@ def preview(scene: Scene, members: Tensor, render: Render, margin: float = RECIP
 
 def least_margins(scene: Scene, members: Tensor, render: Render) -> Tensor:
     """(N,) the margin from which on `hide` changes each Gaussian; infinite where none does, 0 of the part."""
-    return _reached(scene, members.cpu(), render)[1]
+    return _reach_margins(scene, members.cpu(), render)[1]
 
 
-def _masked(scene: Scene, members: Tensor, margin: float, render: Render) -> tuple[list[np.ndarray], Tensor]:
+def _mask_views(
+    scene: Scene, members: Tensor, margin: float, render: Render
+) -> tuple[list[np.ndarray], Tensor]:
     """Masks (H, W) of the part in all views, and (N,) bool of what is hidden with it."""
-    margins, least = _reached(scene, members, render)
+    margins, least = _reach_margins(scene, members, render)
     return [each <= margin for each in margins], least <= margin
 
 
-def _reached(scene: Scene, members: Tensor, render: Render) -> tuple[list[np.ndarray], Tensor]:
+def _reach_margins(scene: Scene, members: Tensor, render: Render) -> tuple[list[np.ndarray], Tensor]:
     """The margins from which on pixels (H, W) of all views, and Gaussians (N,), are hidden with the part."""
     cameras = [scene.camera(view) for view in range(scene.num_views)]
     means, margins = scene.gaussians.means.cpu(), []
@@ -175,12 +177,12 @@ def _block_side(scene: Scene, members: Tensor, blocks: float) -> float:
     return max(longest / blocks, 2 * float(scene.gaussians.scales[largest].max()), 1e-6)
 
 
-def _unnamed(scene: Scene, rows: Tensor) -> tuple[Scene, tuple[str, ...]]:
+def _remove_names(scene: Scene, rows: Tensor) -> tuple[Scene, tuple[str, ...]]:
     """The scene without what people called what is hidden: names and denials of atoms that mostly lie in it,
     notes pinned to it, names of the inventory's things."""
     record, semantics = scene.record, scene.semantics
     notes = list(record.tour.get("notes", ()))
-    pinned = _pinned(notes, scene, rows)
+    pinned = _is_pinned(notes, scene, rows)
     told = {*record.atom_names, *record.atom_denials}
     shares = semantics.weight_values * scene.gaussians.opacities[:, None]
     sums = torch.zeros(2, semantics.num_atoms + 1)
@@ -205,7 +207,7 @@ def _unnamed(scene: Scene, rows: Tensor) -> tuple[Scene, tuple[str, ...]]:
     return replace(scene, record=cleared), names
 
 
-def _pinned(notes: list[dict], scene: Scene, rows: Tensor) -> list[bool]:
+def _is_pinned(notes: list[dict], scene: Scene, rows: Tensor) -> list[bool]:
     """Of notes, whether what is hidden is nearer to one of their ends than all that stays."""
     means, found = scene.gaussians.means.double(), []
     for note in notes:
@@ -221,7 +223,7 @@ def _transients(scene: Scene, view: int, hiding: Hiding, render: Render) -> np.n
     shares = scene.record.left_out.get("shares", ())
     if not scene.photos or view >= len(shares) or not shares[view]:
         return np.zeros(scene.view_size[::-1], bool)
-    return grown(not_in_scene(scene, view, render), hiding.margin)
+    return dilate_mask(not_in_scene(scene, view, render), hiding.margin)
 
 
 def _with_photos(

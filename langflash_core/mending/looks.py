@@ -15,9 +15,9 @@ from torch import Tensor
 from langflash_core.geometry.harmonics import colour_to_sh
 from langflash_core.mending.settings import PREVIEW
 from langflash_core.scene.exposure import lit_camera
-from langflash_core.scene.gaps import filled
+from langflash_core.scene.gaps import fill_gaps
 from langflash_core.splat import drawable_rows, project, view_colours, view_depths
-from langflash_core.splat.compose import blended, layers_of
+from langflash_core.splat.compose import blend_layers, layers_of
 from langflash_core.splat.tiles import rasterize_tiles
 from langflash_core.types import Camera, Frame, Record, Scene, Semantics
 
@@ -25,16 +25,16 @@ Render = Callable[..., Frame]  # (scene, camera, weight_maps=True)
 Progress = Callable[[str, float], None]
 
 
-def drawn(scene: Scene, camera: Camera, *, weight_maps: bool = True) -> Frame:
+def draw_scene(scene: Scene, camera: Camera, *, weight_maps: bool = True) -> Frame:
     """A frame by the rasteriser for processors, for those who have no other at hand. Twin: `splat.render`."""
     parts, weights = layers_of(scene, camera) if scene.layered else ([], np.ones(0))
     if not parts:
-        return _drawn(scene, camera, weight_maps)
-    return blended([_drawn(part, camera, weight_maps) for part in parts], weights)
+        return _draw_layer(scene, camera, weight_maps)
+    return blend_layers([_draw_layer(part, camera, weight_maps) for part in parts], weights)
 
 
-def _drawn(scene: Scene, camera: Camera, weight_maps: bool) -> Frame:
-    """`drawn` of a scene of one layer."""
+def _draw_layer(scene: Scene, camera: Camera, weight_maps: bool) -> Frame:
+    """`draw_scene` of a scene of one layer."""
     rows = drawable_rows(scene)
     gaussians = scene.gaussians.map(lambda values: values.double()[rows])
     layers = torch.cat((view_colours(gaussians, camera), view_depths(gaussians, camera)[:, None]), 1)
@@ -66,7 +66,7 @@ def mattes(
     return found
 
 
-def reddened(scene: Scene, rows: Tensor) -> Scene:
+def redden(scene: Scene, rows: Tensor) -> Scene:
     """The scene with some Gaussians (N,) bool in red, still light and dark."""
     sh = scene.gaussians.sh.clone()
     sh[rows] *= 1 - PREVIEW.red
@@ -78,12 +78,12 @@ def before_and_after(scene: Scene, rows: Tensor, after: Scene | None, render: Re
     """A picture (H, W, 3) in [0, 1]: a photo's view in each line, at the left what some Gaussians show in
     red, at the right the scene as it is to be; None: only the left."""
     columns = []
-    for each in (reddened(scene, rows), after):
+    for each in (redden(scene, rows), after):
         if each is None:
             continue
         frames = [
             render(each, lit_camera(each, each.camera(view)), weight_maps=False)
             for view in range(min(scene.num_views, PREVIEW.most_views))
         ]
-        columns.append(torch.cat([filled(frame.rgb.cpu(), frame.alphas.cpu()) for frame in frames]))
+        columns.append(torch.cat([fill_gaps(frame.rgb.cpu(), frame.alphas.cpu()) for frame in frames]))
     return torch.cat(columns, 1).clamp(0, 1)

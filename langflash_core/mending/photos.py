@@ -19,13 +19,13 @@ from langflash_core.base.picture_files import STORED, opened_picture
 from langflash_core.errors import SceneFileError
 from langflash_core.mending.settings import HIDDEN_PHOTOS
 from langflash_core.scene.exposure import lit_camera
-from langflash_core.scene.gaps import filled
+from langflash_core.scene.gaps import fill_gaps
 from langflash_core.types import Camera, Scene
 
 from .looks import Render
 
 
-def grown(mask: Bool[np.ndarray, "H W"], margin: float) -> Bool[np.ndarray, "H W"]:
+def dilate_mask(mask: Bool[np.ndarray, "H W"], margin: float) -> Bool[np.ndarray, "H W"]:
     """The mask with all within a margin of it, as a share of the longer side; two pixels at least."""
     return reaches(mask) <= margin
 
@@ -48,14 +48,14 @@ def painted_over(scene: Scene, view: int, mask: Bool[np.ndarray, "H W"], render:
     Raises:
         SceneFileError: the photo cannot be read.
     """
-    photo = _decoded(scene.photos[view], view)
+    photo = _decode_photo(scene.photos[view], view)
     height, width = photo.shape[:2]
     covered = cv2.resize(mask.astype(np.float32), (width, height), interpolation=cv2.INTER_LINEAR)
     covered = (
         cv2.GaussianBlur((covered > 0).astype(np.float32), (0, 0), width / mask.shape[1])
         > HIDDEN_PHOTOS.rounded
     )
-    shown = _shown(scene, scene.camera(view, width, height), render)
+    shown = _render_as_photo(scene, scene.camera(view, width, height), render)
     painted = np.where(covered[..., None], shown, photo)
     stream = io.BytesIO()
     Image.fromarray(painted).save(stream, "JPEG", quality=HIDDEN_PHOTOS.quality)
@@ -69,8 +69,8 @@ def not_in_scene(scene: Scene, view: int, render: Render) -> Bool[np.ndarray, "H
         SceneFileError: the photo cannot be read.
     """
     width, height = scene.view_size
-    photo = cv2.resize(_decoded(scene.photos[view], view), (width, height), interpolation=cv2.INTER_AREA)
-    shown = _shown(scene, scene.camera(view), render)
+    photo = cv2.resize(_decode_photo(scene.photos[view], view), (width, height), interpolation=cv2.INTER_AREA)
+    shown = _render_as_photo(scene, scene.camera(view), render)
     apart = abs(photo.astype(np.float32) - shown.astype(np.float32)).mean(-1) / 255
     return cv2.blur(apart, (HIDDEN_PHOTOS.patch, HIDDEN_PHOTOS.patch)) > HIDDEN_PHOTOS.strange
 
@@ -85,7 +85,7 @@ def without_photos(scene: Scene) -> Scene:
     return replace(scene, photos=()).with_record(photos=())
 
 
-def _decoded(photo: bytes, view: int) -> UInt8[np.ndarray, "h w 3"]:
+def _decode_photo(photo: bytes, view: int) -> UInt8[np.ndarray, "h w 3"]:
     try:
         with opened_picture(photo, STORED) as opened:
             return np.asarray(opened.convert("RGB"))
@@ -95,8 +95,8 @@ def _decoded(photo: bytes, view: int) -> UInt8[np.ndarray, "h w 3"]:
         ) from error
 
 
-def _shown(scene: Scene, camera: Camera, render: Render) -> UInt8[np.ndarray, "h w 3"]:
+def _render_as_photo(scene: Scene, camera: Camera, render: Render) -> UInt8[np.ndarray, "h w 3"]:
     """A view as its photo has it, in that one's light, its gaps filled by what is around them."""
     frame = render(scene, lit_camera(scene, camera), weight_maps=False)
-    shown = filled(frame.rgb.cpu().float(), frame.alphas.cpu().float())
+    shown = fill_gaps(frame.rgb.cpu().float(), frame.alphas.cpu().float())
     return (shown.clamp(0, 1) * 255).round().byte().numpy()

@@ -25,7 +25,7 @@ from langflash_core.errors import InputError
 from langflash_core.geometry.cameras import invert_rigid
 from langflash_core.geometry.quaternions import quats_to_matrices
 from langflash_core.mending.settings import CRUMBS
-from langflash_core.scene.instances import connected
+from langflash_core.scene.instances import connected_parts
 from langflash_core.scene.selection import isolation
 from langflash_core.scene.settings import INSTANCES
 from langflash_core.scene.thin import covered_areas
@@ -88,7 +88,7 @@ def _of_layers(
     return found
 
 
-def chosen(least: Float[np.ndarray, " N"], strength: float) -> Bool[np.ndarray, " N"]:
+def choose_removed(least: Float[np.ndarray, " N"], strength: float) -> Bool[np.ndarray, " N"]:
     """What goes at a strength in [0, 1]; nothing at 0."""
     return (least <= strength) & (strength > 0)
 
@@ -106,7 +106,7 @@ def _floaters(scene: Scene, visible: Bool[np.ndarray, " N"]) -> Float[np.ndarray
 def _crumbs(scene: Scene, visible: Bool[np.ndarray, " N"]) -> Float[np.ndarray, " N"]:
     """-log10 of the share of all surface that the connected part of each has, where nothing else is near."""
     scores = np.zeros(len(visible))
-    parts, radii = connected(scene.gaussians, visible)
+    parts, radii = connected_parts(scene.gaussians, visible)
     surfaces = np.bincount(parts[parts >= 0], (radii**2)[parts >= 0])
     small = (parts >= 0) & (surfaces[parts] < 10 ** -LIMITS["crumbs"][1] * surfaces.sum())
     rest = (parts >= 0) & ~small

@@ -16,10 +16,10 @@ from jaxtyping import Bool, Float
 from scipy import ndimage
 
 from langflash_core.mending.settings import TEXTURE
-from langflash_core.scene.gaps import filled
+from langflash_core.scene.gaps import fill_gaps
 
 
-def healed(
+def heal(
     colours: Float[np.ndarray, "H W 3"], known: Bool[np.ndarray, "H W"], hole: Bool[np.ndarray, "H W"]
 ) -> Float[np.ndarray, "H W 3"]:
     """Colours with the hole filled; the rest as it was, and what is neither known nor hole as smooth as it.
@@ -27,19 +27,19 @@ def healed(
     Args:
         colours: in [0, 1]; those that are not known are not looked at.
     """
-    smooth = spread(colours, known)
+    smooth = diffuse(colours, known)
     result = np.where(known[..., None], colours, smooth)
     shift = _best_shift(result, known, hole)
     if shift is None:
         return result
     copied = np.roll(result, shift, (0, 1))
     band = known & np.roll(known, shift, (0, 1)) & _around(hole)
-    missing = spread(result - copied + 1, band) - 1  # above 0, as colours are
+    missing = diffuse(result - copied + 1, band) - 1  # above 0, as colours are
     result[hole] = np.clip(copied + missing, 0, 1)[hole]
     return result
 
 
-def spread(values: Float[np.ndarray, "H W n"], known: Bool[np.ndarray, "H W"]) -> Float[np.ndarray, "H W n"]:
+def diffuse(values: Float[np.ndarray, "H W n"], known: Bool[np.ndarray, "H W"]) -> Float[np.ndarray, "H W n"]:
     """Values carried from where they are known to everywhere, smoothly; 0 where nothing is known at all."""
     if not known.any():
         return np.zeros_like(values)
@@ -48,8 +48,8 @@ def spread(values: Float[np.ndarray, "H W n"], known: Bool[np.ndarray, "H W"]) -
     square[: known.shape[0], : known.shape[1], 3] = known
     square[: known.shape[0], : known.shape[1], :3] = np.where(known[..., None], values, 0)
     whole = torch.from_numpy(square)
-    near = filled(whole[..., :3], whole[..., 3]).numpy()[: known.shape[0], : known.shape[1]]
-    weight = filled(whole[..., 3:].expand(-1, -1, 3), whole[..., 3]).numpy()[
+    near = fill_gaps(whole[..., :3], whole[..., 3]).numpy()[: known.shape[0], : known.shape[1]]
+    weight = fill_gaps(whole[..., 3:].expand(-1, -1, 3), whole[..., 3]).numpy()[
         : known.shape[0], : known.shape[1]
     ]
     nearest = ndimage.distance_transform_edt(~known, return_distances=False, return_indices=True)

@@ -14,7 +14,7 @@ from langflash_core.geometry.harmonics import colour_to_sh
 from langflash_core.geometry.quaternions import matrices_to_quats
 from langflash_core.geometry.surfels import ellipses, spans
 from langflash_core.network.layers.dpt import DPT
-from langflash_core.network.occlusion import drawn_back, extended, over_edges
+from langflash_core.network.occlusion import drawn_back, extend_surfaces, over_edges
 from langflash_core.network.presets import Preset
 from langflash_core.network.prior import resize
 from langflash_core.network.settings import ELEMENTS
@@ -104,7 +104,7 @@ def assemble_gaussians(
     """
     edges = over_edges(depth_maps.log_depths)
     pos_c, axes, scales = footprints(depth_maps.depths, Ks, edges)
-    pos_c, scales = extended(pos_c, scales, depth_maps.log_depths, Ks)
+    pos_c, scales = extend_surfaces(pos_c, scales, depth_maps.log_depths, Ks)
     poses = invert_rigid(viewmats)
     means = torch.einsum("vij,vhwj->vhwi", poses[:, :3, :3], pos_c) + poses[:, None, None, :3, 3]
     quats = matrices_to_quats(poses[:, None, None, :3, :3] @ axes)

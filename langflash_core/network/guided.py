@@ -11,7 +11,7 @@ from jaxtyping import Float
 from torch import Tensor
 from torch.nn import functional as F
 
-from langflash_core.base.many import FEW, groups_of, held, together
+from langflash_core.base.many import FEW, groups_of, in_half_precision, together
 from langflash_core.base.memory import give_back
 from langflash_core.base.running import Run
 from langflash_core.cameras.poses import Poses
@@ -44,7 +44,7 @@ from langflash_core.network.semantics.grouping import (
 )
 from langflash_core.network.semantics.naming import PartNamer, describe, places
 from langflash_core.network.semantics.second import SecondHead, both, looked_at
-from langflash_core.network.semantics.splitting import condensed, joint_maps, split_groups, split_maps
+from langflash_core.network.semantics.splitting import condense_features, joint_maps, split_groups, split_maps
 from langflash_core.network.sweep import DepthRefiner
 from langflash_core.rig.neighbours import source_views
 from langflash_core.rig.pairs import best
@@ -112,9 +112,9 @@ class GuidedDepthNet(LangFlashNet):
     def encode(self, images: Float[Tensor, "B V 3 H W"], Ks: Float[Tensor, "B V 3 3"]) -> Tokens:
         """Four hooks of the frozen encoder, two of the half that names of real photos taught and one of that
         which their depth taught; the intrinsics join later."""
-        return Tokens.beside([self._encoded(images[:, some]) for some in groups_of(images.shape[1])])
+        return Tokens.beside([self._encode_images(images[:, some]) for some in groups_of(images.shape[1])])
 
-    def _encoded(self, images: Tensor) -> Tokens:
+    def _encode_images(self, images: Tensor) -> Tokens:
         with self._fast(images):
             tokens, early = self.encoder(images)
             tokens = with_taught(tokens, early, self.encoder.vit, self.late, self.deep)
@@ -165,7 +165,7 @@ class GuidedDepthNet(LangFlashNet):
                 own = self._exact(self.language_head(tokens.views(range(some.start, some.stop))))
             if count > _CLOSELY:
                 own = F.normalize(F.avg_pool2d(own.flatten(0, 1), 2), dim=1).unflatten(0, own.shape[:2])
-            return held(own, count)
+            return in_half_precision(own, count)
 
         return together(map(features, groups_of(count)), count, 1)
 
@@ -229,7 +229,7 @@ class GuidedDepthNet(LangFlashNet):
         survivors = surviving_of(strongest, existence, self.preset.tau_exist)
         if len(survivors) == 0:
             return images.new_zeros(images.shape[1], 0, *size)
-        meant = condensed(features)
+        meant = condense_features(features)
 
         def joint(number: int) -> Tensor:
             fine = finest[number].float()
@@ -262,7 +262,7 @@ class GuidedDepthNet(LangFlashNet):
     ) -> Geometry:
         """Depth, poses, refined depth with edges and flat surfaces that agrees between photos, Gaussians."""
         with run.stage("depth"):
-            levels, prior = self._predicted(tokens, Ks)
+            levels, prior = self._predict_depth(tokens, Ks)
         with run.stage("poses"):
             local = one_by_one(self.local, images[0])
             poses = find_poses(views, Ks[0], prior, local, run)
@@ -270,7 +270,7 @@ class GuidedDepthNet(LangFlashNet):
                 return Geometry.of_bent(poses.bent)
             Ks = found_lenses(Ks[0], poses)[None]
             if is_other_lens(poses):
-                levels, prior = self._predicted(tokens, Ks)
+                levels, prior = self._predict_depth(tokens, Ks)
                 poses = rescale_poses(poses, views, Ks[0], prior, local)
             rig = placed_rig(images[0], Ks[0], prior, poses)
         with run.stage("refinement"):
@@ -282,7 +282,7 @@ class GuidedDepthNet(LangFlashNet):
                 gaussians = assemble_gaussians(raw[0], images[0], maps, rig.viewmats, rig.Ks)
         return _geometry(gaussians, rig, poses, views)
 
-    def _predicted(self, tokens: Tokens, Ks: Tensor) -> tuple[tuple[Tensor, ...], DepthMaps]:
+    def _predict_depth(self, tokens: Tokens, Ks: Tensor) -> tuple[tuple[Tensor, ...], DepthMaps]:
         """What the geometry heads read, and depth of each photo by itself."""
         levels = self.levels(tokens, Ks)
         return levels, self._prior(levels, tokens)

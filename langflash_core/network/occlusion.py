@@ -48,7 +48,7 @@ def drawn_back(
     return pos_c, tangent_u * shorter[..., :1], tangent_v * shorter[..., 1:]
 
 
-def extended(
+def extend_surfaces(
     pos_c: Float[Tensor, "V H W 3"],
     scales: Float[Tensor, "V H W 3"],
     log_depths: Float[Tensor, "V H W"],

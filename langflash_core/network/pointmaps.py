@@ -14,12 +14,12 @@ from langflash_core.network.encoders.shared import Tokens
 from langflash_core.network.encoders.vit import RotaryEncoder
 from langflash_core.network.layers.decoder import TwoStacks
 from langflash_core.network.model import MEANING_STAGES, Geometry, LangFlashNet
-from langflash_core.network.points.heads import Levels, ParameterHead, PerView, PointHead, activated
+from langflash_core.network.points.heads import Levels, ParameterHead, PerView, PointHead, activate_gaussians
 from langflash_core.network.points.resection import depths_and_confidences, resect
 from langflash_core.network.presets import PointMaps
 from langflash_core.network.semantics.aggregation import Aggregation
 from langflash_core.network.semantics.grouping import group_weights, surviving
-from langflash_core.network.semantics.residual import ResidualGrouping, ScratchPair, filtered
+from langflash_core.network.semantics.residual import ResidualGrouping, ScratchPair, filter_queries
 from langflash_core.network.semantics.splitting import split_groups
 from langflash_core.types import Views
 
@@ -154,7 +154,7 @@ class PointMapNet(LangFlashNet):
             return self._clusters(features[0], size)
         groups = self.group(tokens, images)[-1]
         rule = self.sizes.mask_filter
-        chosen = surviving(groups, self.preset.tau_exist) if rule is None else filtered(groups, rule)
+        chosen = surviving(groups, self.preset.tau_exist) if rule is None else filter_queries(groups, rule)
         return group_weights(groups, chosen, size)
 
     def _clusters(self, features: Tensor, size: tuple[int, int]) -> Tensor:
@@ -181,8 +181,8 @@ class PointMapNet(LangFlashNet):
                 viewmats[view] = torch.from_numpy(found.viewmat).to(points)
             depths, confidences = depths_and_confidences(points, viewmats, Ks[0])
         with run.stage("Gaussians"):
-            gaussians = activated(self.raw_gaussians(tokens, images)[0], points)
-        unplaced = tuple(view for view, found in enumerate(placed, 1) if not found.trusted)
+            gaussians = activate_gaussians(self.raw_gaussians(tokens, images)[0], points)
+        unplaced = tuple(view for view, found in enumerate(placed, 1) if not found.is_trusted)
         return Geometry(gaussians, viewmats, depths, confidences, unplaced)
 
 

@@ -5,7 +5,7 @@ import torch
 _INSTRUCTIONS = ("amx_bf16", "avx512_bf16", "bf16", "sve_bf16")
 
 
-def mixed(device: str | torch.device) -> torch.autocast:
+def mixed_precision(device: str | torch.device) -> torch.autocast:
     """A context in which matrix products run in bfloat16 where that is quicker, else as they are.
 
     On a processor without such instructions bfloat16 is emulated: the encoder took two to five

@@ -95,7 +95,7 @@ def sweep_correlation(
             turned = relative[:3, :3] @ directions[view]
             pos_o = turned[..., None] * depths + relative[:3, 3, None, None]  # (3, h w, P)
             there = see_points(pos_o.flatten(1), Ks[other], (height, width))
-            ndc = torch.stack(there.scaled)
+            ndc = torch.stack(there.normalised_coordinates)
             inside = (there.z > 0) & (ndc.abs() <= 1).all(0)  # of a pixel on the border half is there
             seen = inside.view_as(depths).to(depths)
             ndc = torch.where(inside, ndc, 0.0).unflatten(1, depths.shape)
@@ -117,10 +117,10 @@ def _products(compared: Compared, view: int, other: int, ndc: Tensor) -> Tensor:
     at_once = max(1, PRIOR.at_once // ndc.shape[2])
     table, own = compared.table[other], compared.own[view]
     parts = zip(ndc.split(at_once, 1), own.split(at_once), strict=True)
-    return torch.cat([torch.bmm(gathered(table, compared.size, there), here) for there, here in parts])
+    return torch.cat([torch.bmm(sample_bilinear(table, compared.size, there), here) for there, here in parts])
 
 
-def gathered(
+def sample_bilinear(
     table: Float[Tensor, "_ C"], size: tuple[int, int], ndc: Float[Tensor, "2 X P"]
 ) -> Float[Tensor, "X P C"]:
     """Bilinear vectors (X, P, C) of a map of `size` = (h, w) at places (2, X, P) of -1 to 1.
@@ -265,7 +265,7 @@ class DepthRefiner(nn.Module):
             (described, plain), seen = self._sweep(compared, logs, viewmats, Ks, neighbours)
         likely = self.sharpness[0] * described.sum(1) + self.sharpness[1] * plain[:, 0]
         evidence = (described.flatten(1, 2), plain[:, 0], seen.mean(1, keepdim=True))
-        hidden = self.regularise(torch.cat((*evidence, _centred(start), colours), 1), shallow, deep)
+        hidden = self.regularise(torch.cat((*evidence, _centre_maps(start), colours), 1), shallow, deep)
         raw = self.answer(F.relu(hidden)).float()
         shift = ((raw[:, :-1] + likely).softmax(1) * self.offsets[:, None, None]).sum(1)
         change = resize(torch.stack((shift, raw[:, -1]), 1), _size(prior.log_depths)).unflatten(0, shape)
@@ -303,7 +303,7 @@ def _size(maps: Tensor) -> tuple[int, int]:
     return maps.shape[-2], maps.shape[-1]
 
 
-def _centred(maps: Tensor) -> Tensor:
+def _centre_maps(maps: Tensor) -> Tensor:
     """Log depth about its mean and log error about a typical one, (n, 2, h, w): no unit left."""
     logs, errors = maps[:, 0], maps[:, 1]
     return torch.stack((logs - logs.mean((1, 2), keepdim=True), errors - PRIOR.typical_log_error), 1)

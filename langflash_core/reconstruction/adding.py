@@ -25,7 +25,7 @@ from langflash_core.geometry.pinhole import from_pixels
 from langflash_core.images.decode import PhotoFacts, read_photo
 from langflash_core.images.lens import exif_fov
 from langflash_core.images.settings import LENS_PRIOR, PHOTO_LIMITS
-from langflash_core.images.straight import straightened
+from langflash_core.images.straight import straighten_views
 from langflash_core.images.views import load_views
 from langflash_core.rig.settings import ADDING, MATCHING, PAIRING
 from langflash_core.surface.added import Shared, add_layers
@@ -79,7 +79,7 @@ def _view(scene: Scene, path: Path, check: Callable[[], None]) -> Views:
     if lens is None or not lens.bend:
         return views
     views = replace(views, lenses=Lenses((0,), (field,), (0.0,), (False,)))
-    return straightened(views, [FoundFocal(1.0, 0.0, lens.photos, lens.bend)])
+    return straighten_views(views, [FoundFocal(1.0, 0.0, lens.photos, lens.bend)])
 
 
 def _lens(scene: Scene, photo: PhotoFacts) -> FoundLens | None:

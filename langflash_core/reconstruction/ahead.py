@@ -56,7 +56,7 @@ class Ahead:
         """
         self.pictures.result()
 
-    def handed(self, kept: Kept, sources: tuple[bytes, ...]) -> Kept:
+    def with_keypoints(self, kept: Kept, sources: tuple[bytes, ...]) -> Kept:
         """`kept`, but for the key points of these photos, where they are those that were matched here."""
         found = self.matched.result()
         if found is None or sources != _sources(self.pictures):
@@ -128,14 +128,14 @@ def begin(
     if read_weights and matches:
         path = weights_file(preset, None if weights is None else Path(weights))
         read_header(path)
-        stored = pool.submit(_stored, pictures, path)
+        stored = pool.submit(_store_sources, pictures, path)
     matching, gone_on = Matching(), list[str]()
     matched = pool.submit(_match, pictures, going_on, matching, keep, gone_on) if matches else _nothing()
     pool.shutdown(wait=False)
     return Ahead(pictures, matched, stored, matching, ended, gone_on)
 
 
-def _stored(pictures: Future[list[Picture]], path: Path) -> Stored:
+def _store_sources(pictures: Future[list[Picture]], path: Path) -> Stored:
     """After the photos, so that an error about one of them need not wait for the end of this."""
     pictures.result()
     return read_stored(path)

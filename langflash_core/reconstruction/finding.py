@@ -32,9 +32,11 @@ def predictor(options: Options, tools: Tools, ahead: Ahead, run: Run) -> Callabl
 
     def predicted(views: Views) -> Prediction:
         if options.keep is None:
-            return _made(views, not_kept, tools, ahead, run)
+            return _predict_scene(views, not_kept, tools, ahead, run)
         kept = keep_of(options.keep, views, _settings(options, tools), ahead.gone_on)
-        return prediction_of(kept("prediction", lambda: arrays_of(_made(views, kept, tools, ahead, run))))
+        return prediction_of(
+            kept("prediction", lambda: arrays_of(_predict_scene(views, kept, tools, ahead, run)))
+        )
 
     return predicted
 
@@ -48,7 +50,7 @@ def keep_of(folder: Path, views: Views, settings: tuple, found: list[str] | None
     return Keep.of(folder, said, (*views.sources, *parts), found)
 
 
-def _made(views: Views, kept: Kept, tools: Tools, ahead: Ahead, run: Run) -> Prediction:
+def _predict_scene(views: Views, kept: Kept, tools: Tools, ahead: Ahead, run: Run) -> Prediction:
     prediction = tools.network.predict(
         views,
         run.within("network"),
@@ -57,7 +59,7 @@ def _made(views: Views, kept: Kept, tools: Tools, ahead: Ahead, run: Run) -> Pre
         tools.groups,
         tools.redrawn,
         tools.finer is None,
-        ahead.handed(kept, views.sources),
+        ahead.with_keypoints(kept, views.sources),
     )
     tensors = {name: value.cpu() for name, value in vars(prediction).items() if isinstance(value, Tensor)}
     return replace(prediction, gaussians=prediction.gaussians.map(Tensor.cpu), **tensors)

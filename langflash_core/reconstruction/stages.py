@@ -13,7 +13,7 @@ from langflash_core.base.memory import peak_memory_mb
 from langflash_core.base.running import Run
 from langflash_core.images.triage import check_shown
 from langflash_core.images.views import load_views
-from langflash_core.level import levelled
+from langflash_core.level import level_scene
 from langflash_core.reconstruction.ahead import Ahead, begin
 from langflash_core.reconstruction.finding import predictor
 from langflash_core.reconstruction.networks import Networks
@@ -37,14 +37,14 @@ def scene_of(options: Options, run: Run, networks: Networks, ahead: Ahead | None
     nothing of it runs on."""
     try:
         options = options.settled()
-        ahead = ahead or _begun(options, run)
-        return _made(options, run, networks, ahead)
+        ahead = ahead or _start_ahead(options, run)
+        return _make_scene(options, run, networks, ahead)
     finally:
         if ahead is not None:
             ahead.end()
 
 
-def _begun(options: Options, run: Run) -> Ahead:
+def _start_ahead(options: Options, run: Run) -> Ahead:
     """What can be done beside the rest."""
     return begin(
         options.photos,
@@ -57,16 +57,16 @@ def _begun(options: Options, run: Run) -> Ahead:
     )
 
 
-def _made(options: Options, run: Run, networks: Networks, ahead: Ahead) -> Scene:
+def _make_scene(options: Options, run: Run, networks: Networks, ahead: Ahead) -> Scene:
     views = _photos(options, run, ahead)
     tools = _weights(options, run, networks, ahead, views)
-    scene, lenses = _assembled(options, run, ahead, tools, views)
+    scene, lenses = _assemble_scene(options, run, ahead, tools, views)
     if lenses:
         scene = scene.with_record(lens={"found": [asdict(lens) for lens in lenses]})
     run.check()
     scene = _in_world(options, scene)
     with run.stage("level"):
-        scene = levelled(scene.with_record(calibration=dict(tools.network.calibration)))
+        scene = level_scene(scene.with_record(calibration=dict(tools.network.calibration)))
     run.report("done", 1.0)
     return _with_cost(scene, run.timings)
 
@@ -106,18 +106,20 @@ def _wait_for_matches(ahead: Ahead, run: Run) -> None:
             told(f"weights: {ahead.matching}", ahead.matching.share)
 
 
-def _found(options: Options, run: Run, ahead: Ahead, tools: Tools, views: Views) -> tuple[Prediction, Views]:
+def _find_scene(
+    options: Options, run: Run, ahead: Ahead, tools: Tools, views: Views
+) -> tuple[Prediction, Views]:
     """What the network finds, and the views as it has them now."""
     with run.stage("network"):
         prediction, views = straight_prediction(predictor(options, tools, ahead, run), views)
         return prediction, found_views(views, prediction)
 
 
-def _assembled(
+def _assemble_scene(
     options: Options, run: Run, ahead: Ahead, tools: Tools, views: Views
 ) -> tuple[Scene, tuple[FoundLens, ...]]:
     """The scene, and the lenses found."""
-    prediction, views = _found(options, run, ahead, tools, views)
+    prediction, views = _find_scene(options, run, ahead, tools, views)
     lenses = prediction.lenses
     with run.stage("assemble"), torch.no_grad():
         if tools.finer is None:

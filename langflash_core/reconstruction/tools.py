@@ -144,5 +144,5 @@ def _redrawn(way: str | None, device: str) -> Redrawn | None:
     """
     if way != "mobile-sam":
         return None
-    outlines = Outlines.installed(device)
+    outlines = Outlines.load_installed(device)
     return lambda weights, views: outlines(weights, source_pictures(views))

@@ -8,7 +8,7 @@ from torch import Tensor
 
 from langflash_core.errors import InputError
 from langflash_core.geometry.cameras import invert_rigid
-from langflash_core.images.straight import after, straightened
+from langflash_core.images.straight import after, straighten_views
 from langflash_core.types import Prediction, Views
 
 _STRAIGHTENED = 3  # times, at most
@@ -47,7 +47,7 @@ def straight_prediction(predict: Callable[[Views], Prediction], views: Views) ->
         assert views.lenses is not None, "bends are sought of lenses that are known"
         before = views.lenses.straightened or (None,) * len(prediction.bent)
         told = zip(before, prediction.bent, strict=True)
-        views = straightened(taken, [old if new is None else after(old, new) for old, new in told])
+        views = straighten_views(taken, [old if new is None else after(old, new) for old, new in told])
     raise AssertionError("the last round seeks no bends")
 
 

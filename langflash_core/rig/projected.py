@@ -38,7 +38,7 @@ class Projected:
         return torch.where(self.inside, self.y.floor() * self.size[1] + self.x.floor(), 0.0).long()
 
     @property
-    def scaled(self) -> tuple[Float[Tensor, "*b n"], Float[Tensor, "*b n"]]:
+    def normalised_coordinates(self) -> tuple[Float[Tensor, "*b n"], Float[Tensor, "*b n"]]:
         """x and y, -1 to 1 over the picture."""
         height, width = self.size
         return self.x / width * 2 - 1, self.y / height * 2 - 1

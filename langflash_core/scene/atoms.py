@@ -38,7 +38,7 @@ def describe_atoms(scene: Scene) -> AtomsReport:
 
 def atom_shares(scene: Scene) -> Float[np.ndarray, " K"]:
     """(K,) of the scene's surface, opacity times area, sum 1; zeros where there is none."""
-    masses = _carried(scene)
+    masses = _atom_areas(scene)
     return masses / max(masses.sum(), 1e-12)
 
 
@@ -76,7 +76,7 @@ def alike_order(similarity: Float[np.ndarray, "K K"]) -> tuple[int, ...]:
     return tuple(order)
 
 
-def _carried(scene: Scene) -> np.ndarray:
+def _atom_areas(scene: Scene) -> np.ndarray:
     """(K,) of the Gaussians' opacity times area that carries each atom."""
     shares = scene.semantics.weight_values.double().numpy() * covered_areas(scene.gaussians)[:, None]
     ids, finite = scene.semantics.weight_ids.numpy(), np.nan_to_num(shares, posinf=0)

@@ -15,7 +15,7 @@ from langflash_core.scene.edits import Marks
 from langflash_core.types import LUMA, Gaussians, Scene
 
 
-def changed(
+def apply_changes(
     gaussians: Gaussians, changes: Iterable[Change], rows: Int[Tensor, " n"] | None = None
 ) -> Gaussians:
     """The Gaussians after all changes, in order; fields that none of them touches are the same tensors.
@@ -32,9 +32,9 @@ def changed(
         if not bool(chosen.any()):
             continue
         if isinstance(change, Moved):
-            gaussians = _moved(gaussians, chosen, change)
+            gaussians = _apply_motion(gaussians, chosen, change)
         else:
-            gaussians = _recoloured(gaussians, chosen, change)
+            gaussians = _apply_colour(gaussians, chosen, change)
     return gaussians
 
 
@@ -43,7 +43,7 @@ def changed_scene(scene: Scene, marks: Marks, more: Change | None = None) -> Sce
 
     more: a change that is not in the marks yet.
     """
-    gaussians = changed(scene.gaussians, (*marks.changes, *(() if more is None else (more,))))
+    gaussians = apply_changes(scene.gaussians, (*marks.changes, *(() if more is None else (more,))))
     return scene if gaussians is scene.gaussians else replace(scene, gaussians=gaussians)
 
 
@@ -57,7 +57,7 @@ def mean_luma(gaussians: Gaussians, rows: Shaped[Tensor, " n"]) -> float:
     return float((luma * weights).sum()) / total if total > 0 else 0.0
 
 
-def _moved(gaussians: Gaussians, chosen: Tensor, change: Moved) -> Gaussians:
+def _apply_motion(gaussians: Gaussians, chosen: Tensor, change: Moved) -> Gaussians:
     """mu' = s R mu + t, R' = R_t R, s' = s s, c'(d) = c(R^T d)."""
     matrix = torch.from_numpy(turn_matrix(change.turn)).to(gaussians.means.device)
     means = change.scale * gaussians.means[chosen].double() @ matrix.T
@@ -77,7 +77,7 @@ def _moved(gaussians: Gaussians, chosen: Tensor, change: Moved) -> Gaussians:
     return replace(gaussians, **fields)
 
 
-def _recoloured(gaussians: Gaussians, chosen: Tensor, change: Recoloured) -> Gaussians:
+def _apply_colour(gaussians: Gaussians, chosen: Tensor, change: Recoloured) -> Gaussians:
     """0.5 + sum_b Y_b c_b is linear in the coefficients: c_b' = M c_b, and Y_0 c_0' takes up M 0.5 - 0.5."""
     matrix = torch.tensor(change.matrix, dtype=torch.float64, device=gaussians.sh.device).view(3, 3)
     harmonics = gaussians.sh[chosen].double() @ matrix.T

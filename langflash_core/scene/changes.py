@@ -62,7 +62,7 @@ class Recoloured:
     matrix: tuple[float, ...]
 
     @staticmethod
-    def tinted(rows: Mask, colour: Spot, strength: float, luma: float) -> "Recoloured":
+    def tint(rows: Mask, colour: Spot, strength: float, luma: float) -> "Recoloured":
         """Mixed with a colour in the Gaussians' own light and shade.
 
         colour' = (1 - s) colour + s tint luma(colour) / m: at full strength what had the mean brightness
@@ -94,7 +94,7 @@ def with_change(changes: tuple[Change, ...], change: Change) -> tuple[Change, ..
     return (*changes, change)
 
 
-def checked(kind: str, rows: Mask, numbers: Any) -> Change:
+def parse_change(kind: str, rows: Mask, numbers: Any) -> Change:
     """A change out of a file.
 
     Raises:
@@ -115,8 +115,8 @@ def checked(kind: str, rows: Mask, numbers: Any) -> Change:
     raise ValueError(f"changes: expected moved or recoloured with its numbers, received {kind}")
 
 
-def told(change: Change) -> tuple[str, list[float]]:
-    """Kind and numbers, as `checked` takes them."""
+def encode_change(change: Change) -> tuple[str, list[float]]:
+    """Kind and numbers, as `parse_change` takes them."""
     if isinstance(change, Moved):
         return "moved", [*change.turn, change.scale, *change.offset]
     return "recoloured", list(change.matrix)

@@ -49,7 +49,7 @@ def read_container(path: Path) -> Container:
         SceneFileError: missing, truncated, damaged, foreign, or of a newer version; says what was
             expected and what was found.
     """
-    header, content = _read(path)
+    header, content = _read_file(path)
     version = _version(path, header)
     try:
         arrays, text = safetensors.numpy.load(content), header["scene"]
@@ -61,7 +61,7 @@ def read_container(path: Path) -> Container:
             version, str(described["space"]), (width, height), dict(described["metadata"]), arrays
         )
     except (SafetensorError, ValueError, LookupError, TypeError, RuntimeError, ArithmeticError) as error:
-        raise damaged(path, error) from error
+        raise damage_error(path, error) from error
 
 
 def write_container(found: Container, path: Path) -> None:
@@ -92,10 +92,10 @@ def check_container(path: Path) -> None:
     Raises:
         SceneFileError: as `read_container`, but for what only the checksum shows.
     """
-    _version(path, _read(path)[0])
+    _version(path, _read_file(path)[0])
 
 
-def damaged(path: Path, reason: object) -> SceneFileError:
+def damage_error(path: Path, reason: object) -> SceneFileError:
     """The error that says so."""
     said = " ".join(str(reason).split())[:200]  # errors repeat what a file holds
     return SceneFileError(f"{path.name} is damaged ({said}); {_REMEDY}")
@@ -111,7 +111,7 @@ def digest(text: str, arrays: Mapping[str, Shaped[np.ndarray, "..."]]) -> str:
     return total.hexdigest()
 
 
-def _read(path: Path) -> tuple[dict[str, str], bytes]:
+def _read_file(path: Path) -> tuple[dict[str, str], bytes]:
     """The `__metadata__` strings and the whole file, after its size was found right."""
     if path.is_dir():
         raise SceneFileError(f"{path} is a folder; name a scene file (.langflash)")

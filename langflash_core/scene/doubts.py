@@ -51,9 +51,9 @@ def doubt_line(record: Record, num_views: int) -> str:
         return ""
     gaps = list(dict.fromkeys(found.gap(view) for view in sorted((*found.torn, *found.alone))))
     if not gaps:
-        return f"{_listed(parts)}; {_AGAIN.format('it' if len(found.blurred) == 1 else 'them')}"
-    where = _listed(gaps) if len(gaps) <= DOUBTS.told else "between them and their neighbours"
-    return f"{_listed(parts)}; {_REMEDY.format(where)}"
+        return f"{_list_parts(parts)}; {_AGAIN.format('it' if len(found.blurred) == 1 else 'them')}"
+    where = _list_parts(gaps) if len(gaps) <= DOUBTS.told else "between them and their neighbours"
+    return f"{_list_parts(parts)}; {_REMEDY.format(where)}"
 
 
 @dataclass(frozen=True)
@@ -101,8 +101,8 @@ def _photos(views: Sequence[int]) -> str:
     more = len(views) - len(named)
     if more:
         named.append("another one" if more == 1 else f"{more} others")
-    return f"photo{'s' * (len(views) > 1)} {_listed(named)}"
+    return f"photo{'s' * (len(views) > 1)} {_list_parts(named)}"
 
 
-def _listed(parts: Sequence[str]) -> str:
+def _list_parts(parts: Sequence[str]) -> str:
     return f"{', '.join(parts[:-1])} and {parts[-1]}" if len(parts) > 1 else parts[0]

@@ -66,12 +66,12 @@ def edited_scene(scene: Scene, marks: Marks) -> Scene:
         scene = scene.with_record(**told)
     if not marks.deleted and marks.atoms == atoms_of(scene):
         return scene
-    joined = _joined(scene, marks.atoms)
+    joined = _merge_atoms(scene, marks.atoms)
     deleted = scene.record.num_deleted + len(marks.deleted)
-    return left(joined, marks).with_record(num_deleted=deleted)
+    return without_deleted(joined, marks).with_record(num_deleted=deleted)
 
 
-def left(scene: Scene, marks: Marks) -> Scene:
+def without_deleted(scene: Scene, marks: Marks) -> Scene:
     """The scene without deleted Gaussians; its atoms and its record as they are."""
     kept = marks.left
     return scene if len(kept) == kept.count else scene.rows(torch.from_numpy(kept.rows()))
@@ -123,7 +123,7 @@ def atoms_of(scene: Scene) -> tuple[Atom, ...]:
 def first_marks(scene: Scene) -> Marks:
     """The marks of a scene as it was opened."""
     return replace(
-        Marks.untouched(len(scene.gaussians), scene.semantics.num_atoms),
+        Marks.without_edits(len(scene.gaussians), scene.semantics.num_atoms),
         atoms=atoms_of(scene),
         camera_path=tuple(scene.record.camera_path),
         metric_scale=scene.record.metric_scale,
@@ -142,7 +142,7 @@ def _masses(scene: Scene) -> Tensor:
     )
 
 
-def _joined(scene: Scene, atoms: Sequence[Atom]) -> Scene:
+def _merge_atoms(scene: Scene, atoms: Sequence[Atom]) -> Scene:
     """The scene with one row per merged atom, their names and silence in its record."""
     semantics = scene.semantics
     heads = sorted({atom.into for atom in atoms})

@@ -63,7 +63,7 @@ class Marks:
     thing_names: Mapping[str, str] = field(default_factory=dict)
 
     @staticmethod
-    def untouched(num_gaussians: int, num_atoms: int) -> "Marks":
+    def without_edits(num_gaussians: int, num_atoms: int) -> "Marks":
         """Of a scene that nobody has edited."""
         nothing = Mask.none(num_gaussians)
         atoms = tuple(Atom(k) for k in range(num_atoms))
@@ -90,7 +90,7 @@ class Marks:
         these marks do not know of. atoms: of that scene, as it was opened."""
         masks = {name: getattr(self, name).of_count(num_gaussians) for name in MASKS}
         atoms = (*self.atoms, *atoms[len(self.atoms) :])[: len(atoms)]
-        return replace(self, **masks, atoms=atoms, changes=_resized(self.changes, num_gaussians))
+        return replace(self, **masks, atoms=atoms, changes=_resize_changes(self.changes, num_gaussians))
 
 
 @dataclass(frozen=True)
@@ -162,12 +162,12 @@ class Edit:
         masks = ((name, Mask(old, zlib.decompress(packed)).of_count(new)) for name, packed in self.flips)
         changes = self.changes
         if changes is not None:
-            changes = (changes[0], _resized(changes[1], new), _resized(changes[2], new))
+            changes = (changes[0], _resize_changes(changes[1], new), _resize_changes(changes[2], new))
         flips = tuple((name, zlib.compress(mask.bits, 1)) for name, mask in masks)
         return replace(self, flips=flips, changes=changes)
 
 
-def _resized(changes: tuple[Change, ...], count: int) -> tuple[Change, ...]:
+def _resize_changes(changes: tuple[Change, ...], count: int) -> tuple[Change, ...]:
     return tuple(replace(change, rows=change.rows.of_count(count)) for change in changes)
 
 
@@ -220,9 +220,9 @@ class History:
         if after == self.marks:
             return self
         done = (*self.done, difference(label, self.marks, after))
-        return replace(self, marks=after, done=done, undone=()).bounded()
+        return replace(self, marks=after, done=done, undone=()).drop_oldest()
 
-    def bounded(self, most_edits: int = MOST_EDITS, most_bytes: int = MOST_BYTES) -> "History":
+    def drop_oldest(self, most_edits: int = MOST_EDITS, most_bytes: int = MOST_BYTES) -> "History":
         """Without the oldest edits where there are too many; the last one always stays."""
         kept, total = 0, 0
         for edit in reversed(self.done):

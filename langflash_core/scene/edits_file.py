@@ -26,7 +26,7 @@ from langflash_core.base.files import write_atomically
 from langflash_core.base.limits import TEXT
 from langflash_core.base.records import World, world_from_json, world_to_json
 from langflash_core.errors import SceneFileError
-from langflash_core.scene.changes import Change, checked, told
+from langflash_core.scene.changes import Change, encode_change, parse_change
 from langflash_core.scene.edited import first_marks
 from langflash_core.scene.edits import MASKS, TOLD, Atom, Edit, History, difference
 from langflash_core.scene.mask import Mask
@@ -58,9 +58,9 @@ def save_history(history: History, scene: Scene, about: dict, path: Path) -> Non
         "gaussians": history.marks.deleted.count,
         "atoms": len(history.marks.atoms),
         "about": about,
-        "done": [_encoded(edit) for edit in history.done],
-        "undone": [_encoded(edit) for edit in history.undone],
-        "before": [_encoded(difference("", *marks)), _encoded(difference("", history.first, oldest))],
+        "done": [_encode_edit(edit) for edit in history.done],
+        "undone": [_encode_edit(edit) for edit in history.undone],
+        "before": [_encode_edit(difference("", *marks)), _encode_edit(difference("", history.first, oldest))],
         "forgotten": history.forgotten,
     }
     write_atomically(path, json.dumps(content).encode())
@@ -72,7 +72,7 @@ def read_about(path: Path) -> tuple[str, dict, int]:
     Raises:
         SceneFileError: as `load_history`.
     """
-    content = _read(path)
+    content = _read_json(path)
     return content["digest"], content["about"], len(content["done"])
 
 
@@ -82,13 +82,13 @@ def load_history(path: Path, scene: Scene) -> History:
     Raises:
         SceneFileError: missing, damaged, or about another scene.
     """
-    content = _read(path)
+    content = _read_json(path)
     if content["digest"] != scene_digest(scene):
         raise SceneFileError(f"{path.name} holds edits of another scene; open the scene they were made in")
     try:
         count = len(scene.gaussians)
         done, undone, before = (
-            tuple(_decoded(entry, count) for entry in content.get(part, ()))
+            tuple(_decode_edit(entry, count) for entry in content.get(part, ()))
             for part in ("done", "undone", "before")
         )
         _check_there((*done, *undone, *before), scene)
@@ -101,11 +101,13 @@ def load_history(path: Path, scene: Scene) -> History:
         whole = replace(start.moved_to(len(done)), undone=undone)
         whole.moved_to(len(done) + len(undone))  # what can be redone must fit as well
     except (ValueError, LookupError, TypeError, AttributeError, ArithmeticError, zlib.error) as error:
-        raise SceneFileError(f"{path.name} is damaged ({_said(error)}); edit the scene again") from error
+        raise SceneFileError(
+            f"{path.name} is damaged ({_error_line(error)}); edit the scene again"
+        ) from error
     return whole
 
 
-def _said(error: Exception) -> str:
+def _error_line(error: Exception) -> str:
     """One short line: what a file holds may have many, and errors repeat it."""
     return " ".join(str(error).split())[:100]
 
@@ -118,7 +120,7 @@ def _check_there(edits: Iterable[Edit], scene: Scene) -> None:
             raise ValueError(f"there: expected at most {most[0]} Gaussians and {most[1]} atoms")
 
 
-def _encoded(edit: Edit) -> dict:
+def _encode_edit(edit: Edit) -> dict:
     encoded = {
         "label": edit.label,
         "flips": {name: base64.b64encode(packed).decode() for name, packed in edit.flips},
@@ -138,7 +140,7 @@ def _plain(value: Any) -> Any:
 
 
 def _encoded_change(change: Change) -> list:
-    kind, numbers = told(change)
+    kind, numbers = encode_change(change)
     return [kind, base64.b64encode(zlib.compress(change.rows.bits, 1)).decode(), numbers]
 
 
@@ -146,15 +148,17 @@ def _decoded_change(count: int, kind: str, packed: str, numbers: list) -> Change
     bits = zlib.decompress(base64.b64decode(packed, validate=True))
     if len(bits) != -(-count // 8):
         raise ValueError(f"changes: expected a scene of {8 * len(bits)} rows, received {count}")
-    return checked(kind, Mask(count, bits), numbers)
+    return parse_change(kind, Mask(count, bits), numbers)
 
 
-def _decoded(entry: dict, count: int) -> Edit:
+def _decode_edit(entry: dict, count: int) -> Edit:
     flips = tuple((name, base64.b64decode(packed, validate=True)) for name, packed in entry["flips"].items())
     if any(name not in MASKS for name, _ in flips):
         raise ValueError(f"flips: expected {', '.join(MASKS)}, received {', '.join(entry['flips'])}")
     swaps = tuple((int(k), _atom(*before), _atom(*after)) for k, before, after in entry["swaps"])
-    values = tuple((name, *(_told(name, value) for value in pair)) for name, *pair in entry.get("told", ()))
+    values = tuple(
+        (name, *(_decode_value(name, value) for value in pair)) for name, *pair in entry.get("told", ())
+    )
     changes = None
     if "changes" in entry:
         stayed, *both = entry["changes"]
@@ -163,7 +167,7 @@ def _decoded(entry: dict, count: int) -> Edit:
     return Edit(str(entry["label"]), flips, swaps, values, changes)
 
 
-def _told(name: str, value: Any) -> Any:
+def _decode_value(name: str, value: Any) -> Any:
     """A value as `Marks` hold it."""
     match name, value:
         case "camera_path", [*keys] if all(isinstance(key, dict) for key in keys):
@@ -189,7 +193,7 @@ def _atom(into: int, name: str, on: bool, *denied: str) -> Atom:
     return Atom(int(into), str(name), bool(on), tuple(map(str, denied)))
 
 
-def _read(path: Path) -> dict:
+def _read_json(path: Path) -> dict:
     try:
         TEXT.check(path.stat().st_size, path.name, SceneFileError)
         content = json.loads(path.read_bytes())
@@ -205,5 +209,7 @@ def _read(path: Path) -> dict:
     except OSError as error:
         raise SceneFileError(f"{path} cannot be read ({error.strerror}); check its permissions") from error
     except (ValueError, LookupError, TypeError, ArithmeticError, RecursionError) as error:
-        raise SceneFileError(f"{path.name} is damaged ({_said(error)}); edit the scene again") from error
+        raise SceneFileError(
+            f"{path.name} is damaged ({_error_line(error)}); edit the scene again"
+        ) from error
     return content

@@ -12,7 +12,7 @@ from jaxtyping import Shaped
 from torch import Tensor
 from torch.nn.functional import normalize
 
-from langflash_core.scene.weights import renormalised
+from langflash_core.scene.weights import renormalise
 from langflash_core.types import Gaussians, Record, Scene, Semantics
 
 REQUIRED = (
@@ -95,7 +95,7 @@ def from_fields(
     )
     semantics = Semantics(
         weight_ids=fields["weight_ids"].long(),
-        weight_values=renormalised(fields["weight_values"].float()),
+        weight_values=renormalise(fields["weight_values"].float()),
         dictionary=fields["dictionary"],
         space=space,
     )

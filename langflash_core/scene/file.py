@@ -22,7 +22,7 @@ from torch import Tensor
 from langflash_core.base.files import write_atomically
 from langflash_core.base.memory import out_of_memory
 from langflash_core.scene.checks import check_scene
-from langflash_core.scene.container import FORMAT, VERSION, damaged, digest, in_order, read_container
+from langflash_core.scene.container import FORMAT, VERSION, damage_error, digest, in_order, read_container
 from langflash_core.scene.fields import NEWER, from_fields, to_fields
 from langflash_core.scene.record import counts_per_view, from_json, to_json
 from langflash_core.types import Scene
@@ -67,7 +67,7 @@ def load(path: Path | str) -> Scene:
     except (ValueError, LookupError, TypeError, RuntimeError, ArithmeticError) as error:
         if out_of_memory(error):
             raise
-        raise damaged(path, error) from error
+        raise damage_error(path, error) from error
     return scene
 
 

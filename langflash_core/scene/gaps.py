@@ -26,7 +26,7 @@ def num_levels(width: int, height: int) -> int:
     return max(1, round(math.log2(max(1.0, min(width, height) / GAPS.reach))))
 
 
-def filled(
+def fill_gaps(
     rgb: Float[Tensor, "H W 3"], alphas: Float[Tensor, "H W"], background: float | Tensor = 0.0
 ) -> Float[Tensor, "H W 3"]:
     """The picture where it is covered, and where it is not what is around, or else the background.
@@ -36,21 +36,21 @@ def filled(
     """
     levels = [torch.cat((rgb, alphas[..., None]), -1)]
     for _ in range(num_levels(rgb.shape[1], rgb.shape[0])):
-        levels.append(pulled(levels[-1]))
+        levels.append(pull_level(levels[-1]))
     behind = levels.pop()
     while levels:
-        behind = pushed(levels.pop(), behind)
+        behind = push_level(levels.pop(), behind)
     return behind[..., :3] + (1 - behind[..., 3:]) * background
 
 
-def pulled(fine: Float[Tensor, "H W 4"]) -> Float[Tensor, "h w 4"]:
+def pull_level(fine: Float[Tensor, "H W 4"]) -> Float[Tensor, "h w 4"]:
     """Sums of 2 x 2 premultiplied colours, covered at most once."""
     pairs = F.avg_pool2d(fine.movedim(-1, 0)[None], 2, ceil_mode=True, divisor_override=1)
     sums = pairs[0].movedim(0, -1)
     return sums / sums[..., 3:].clamp_min(1)
 
 
-def pushed(fine: Float[Tensor, "H W 4"], coarse: Float[Tensor, "h w 4"]) -> Float[Tensor, "H W 4"]:
+def push_level(fine: Float[Tensor, "H W 4"], coarse: Float[Tensor, "h w 4"]) -> Float[Tensor, "H W 4"]:
     """The coarse picture, interpolated linearly, behind the fine one."""
     height, width = fine.shape[:2]
     smooth = F.interpolate(coarse.movedim(-1, 0)[None], scale_factor=2, mode="bilinear")

@@ -30,7 +30,7 @@ def instances(
         From 1, the largest surface (sum of r^2) first; 0 for others, and for crumbs below
         `INSTANCES.smallest` of it.
     """
-    return _numbered(*connected(gaussians, members, link))
+    return _number_parts(*connected_parts(gaussians, members, link))
 
 
 def things(scene: Scene, members: Bool[np.ndarray, " N"]) -> Integer[np.ndarray, " N"]:
@@ -40,20 +40,22 @@ def things(scene: Scene, members: Bool[np.ndarray, " N"]) -> Integer[np.ndarray,
     Parts a and b are one where the photo of b's layer shows, at the pixels of b and within `INSTANCES.same`
     of their depth, at least `INSTANCES.shown` of the smaller one's surface of a.
     """
-    return _numbered(*parts_of(scene, members))
+    return _number_parts(*parts_of(scene, members))
 
 
 def parts_of(
     scene: Scene, members: Bool[np.ndarray, " N"]
 ) -> tuple[Integer[np.ndarray, " N"], Float[np.ndarray, " N"]]:
-    """`connected` of a scene; what several layers show has one number, as in `things`."""
-    parts, radii = connected(scene.gaussians, members)
+    """`connected_parts` of a scene; what several layers show has one number, as in `things`."""
+    parts, radii = connected_parts(scene.gaussians, members)
     if scene.layered and parts.max(initial=-1) > 0:
         parts = _as_one(scene, parts, radii)
     return parts, radii
 
 
-def _numbered(parts: Integer[np.ndarray, " N"], radii: Float[np.ndarray, " N"]) -> Integer[np.ndarray, " N"]:
+def _number_parts(
+    parts: Integer[np.ndarray, " N"], radii: Float[np.ndarray, " N"]
+) -> Integer[np.ndarray, " N"]:
     """Numbers of `instances`, of parts from 0, -1 of none."""
     some = parts >= 0
     if not some.any():
@@ -108,7 +110,7 @@ def _shown_at(
     return np.where(inside & (np.abs(logs - deep[pixels]) <= INSTANCES.same), shown[pixels], -1)
 
 
-def connected(
+def connected_parts(
     gaussians: Gaussians, members: Bool[np.ndarray, " N"], link: float = INSTANCES.link
 ) -> tuple[Integer[np.ndarray, " N"], Float[np.ndarray, " N"]]:
     """A number from 0 for the connected part of each, -1 of what is no member or not finite; and their

@@ -6,7 +6,7 @@ import torch
 from torch import Tensor
 
 from langflash_core.errors import InputError
-from langflash_core.scene.changed import changed
+from langflash_core.scene.changed import apply_changes
 from langflash_core.scene.changes import Moved, Spot
 from langflash_core.scene.mask import Mask
 from langflash_core.scene.settings import JOINING
@@ -21,7 +21,7 @@ class _Box:
     high: Tensor
 
 
-def joined(
+def join_scenes(
     first: Scene,
     second: Scene,
     names: tuple[str, str] = ("this scene", "the other"),
@@ -49,7 +49,7 @@ def joined(
     if second.layered:
         raise ValueError("second: expected a scene without layers, received one of layers; fuse it before")
     _check(first, second, names)
-    placed = changed(second.gaussians, (beside(first if shown is None else shown, second),))
+    placed = apply_changes(second.gaussians, (beside(first if shown is None else shown, second),))
     view_ids = None
     if first.view_ids is not None:
         view_ids = torch.cat((first.view_ids, first.view_ids.new_full((len(placed),), -1)))
@@ -65,7 +65,7 @@ def append_layers(scene: Scene, part: Scene) -> Scene:
         part: in the scene's world and light.
 
     Raises:
-        InputError: as `joined`.
+        InputError: as `join_scenes`.
         ValueError: nobody knows which photo made what.
     """
     if scene.view_ids is None or part.view_ids is None:
@@ -83,7 +83,7 @@ def _behind(first: Scene, second: Scene, view_ids: Tensor | None) -> Scene:
     after, ours, theirs = first.semantics.num_atoms, first.record, second.record
     scene = replace(
         first,
-        gaussians=_stacked(first.gaussians, second.gaussians),
+        gaussians=_stack_gaussians(first.gaussians, second.gaussians),
         semantics=_joined_semantics(first.semantics, second.semantics),
         view_ids=view_ids,
         levels=_known_of_both(first, second, first.levels, second.levels, 0),
@@ -99,7 +99,7 @@ def _behind(first: Scene, second: Scene, view_ids: Tensor | None) -> Scene:
     )
 
 
-def appended(scene: Scene, part: Scene) -> Scene:
+def append_part(scene: Scene, part: Scene) -> Scene:
     """The scene with a part of its own kind behind its Gaussians: of the same dictionary, in the same world.
 
     Raises:
@@ -115,8 +115,8 @@ def appended(scene: Scene, part: Scene) -> Scene:
     most = max(ours.weight_ids.shape[1], theirs.weight_ids.shape[1])
     semantics = replace(
         ours,
-        weight_ids=torch.cat([_padded(each.weight_ids, most) for each in (ours, theirs)]),
-        weight_values=torch.cat([_padded(each.weight_values, most) for each in (ours, theirs)]),
+        weight_ids=torch.cat([_pad_columns(each.weight_ids, most) for each in (ours, theirs)]),
+        weight_values=torch.cat([_pad_columns(each.weight_values, most) for each in (ours, theirs)]),
     )
     view_ids = None
     if scene.view_ids is not None:
@@ -124,7 +124,7 @@ def appended(scene: Scene, part: Scene) -> Scene:
         view_ids = torch.cat((scene.view_ids, unknown if part.view_ids is None else part.view_ids))
     return replace(
         scene,
-        gaussians=_stacked(scene.gaussians, part.gaussians),
+        gaussians=_stack_gaussians(scene.gaussians, part.gaussians),
         semantics=semantics,
         view_ids=view_ids,
         levels=_known_of_both(scene, part, scene.levels, part.levels, 0),
@@ -186,10 +186,10 @@ def _box(gaussians: Gaussians) -> _Box:
     return _Box(ordered[round(JOINING.edge * last)], ordered[round((1 - JOINING.edge) * last)])
 
 
-def _stacked(first: Gaussians, second: Gaussians) -> Gaussians:
+def _stack_gaussians(first: Gaussians, second: Gaussians) -> Gaussians:
     """Both, with as many harmonics as the one that has more; the others' are 0."""
     bases = max(first.sh.shape[1], second.sh.shape[1])
-    ours, theirs = (replace(some, sh=_padded(some.sh, bases)) for some in (first, second))
+    ours, theirs = (replace(some, sh=_pad_columns(some.sh, bases)) for some in (first, second))
     pairs = (
         (getattr(ours, name), getattr(theirs, name))
         for name in ("means", "quats", "scales", "opacities", "sh")
@@ -206,16 +206,16 @@ def _joined_semantics(first: Semantics, second: Semantics) -> Semantics:
         for each in (first, second)
     ]
     shifted = second.weight_ids + first.num_atoms if second.num_atoms else second.weight_ids
-    values = (_padded(first.weight_values, most), _padded(second.weight_values, most))
+    values = (_pad_columns(first.weight_values, most), _pad_columns(second.weight_values, most))
     return Semantics(
-        weight_ids=torch.cat((_padded(first.weight_ids, most), _padded(shifted, most))),
+        weight_ids=torch.cat((_pad_columns(first.weight_ids, most), _pad_columns(shifted, most))),
         weight_values=torch.cat((values[0], values[1].to(values[0]))),
         dictionary=torch.cat((rows[0], rows[1].to(rows[0]))),
         space=spoken.space,
     )
 
 
-def _padded(values: Tensor, columns: int) -> Tensor:
+def _pad_columns(values: Tensor, columns: int) -> Tensor:
     """(N, n, ...) with zeros up to so many columns."""
     more = values.new_zeros(len(values), columns - values.shape[1], *values.shape[2:])
     return torch.cat((values, more), 1)

@@ -17,7 +17,7 @@ from torch import Tensor
 from torch.nn.functional import normalize
 
 from langflash_core.errors import InputError
-from langflash_core.scene.joining import appended
+from langflash_core.scene.joining import append_part
 from langflash_core.scene.settings import JOINING
 from langflash_core.scene.thin import covered_areas
 from langflash_core.types import Scene
@@ -50,7 +50,7 @@ def with_lone_part(scene: Scene, part: Bool[Tensor, " N"], shown: Scene | None =
     )
     ids[:, 0], values[:, 0] = number, 1.0
     lone = replace(copies, semantics=replace(copies.semantics, weight_ids=ids, weight_values=values))
-    return appended(whole, lone).with_record(lone_atoms=(*scene.record.lone_atoms, number))
+    return append_part(whole, lone).with_record(lone_atoms=(*scene.record.lone_atoms, number))
 
 
 def mean_meaning(scene: Scene, part: Bool[Tensor, " N"]) -> Tensor:

@@ -136,14 +136,14 @@ def regions_of(scene: Scene) -> Regions:
     first, second = nodes.pairs
     near = np.linalg.norm(nodes.colours[first] - nodes.colours[second], axis=1) < REGIONS.shade
     same = near & (nodes.atoms[first] == nodes.atoms[second]) & (nodes.jumps < 0.5) & nodes.beside
-    leaves = _connected(first[same], second[same], len(nodes.atoms))
+    leaves = _label_components(first[same], second[same], len(nodes.atoms))
     tree = _Joining.of(nodes, leaves, _meaning(scene)).done()
     atoms = np.full(int(leaves.max()) + 1, -1)
     atoms[leaves] = nodes.atoms
     return Regions(np.append(leaves, -1)[nodes.own], *tree, atoms)
 
 
-def _connected(first: np.ndarray, second: np.ndarray, count: int) -> Integer[np.ndarray, " n"]:
+def _label_components(first: np.ndarray, second: np.ndarray, count: int) -> Integer[np.ndarray, " n"]:
     """Numbers from 0 of what is connected by pairs."""
     graph = coo_matrix((np.ones(len(first), bool), (first, second)), (count, count))
     return connected_components(graph, directed=False)[1].astype(np.int64)
@@ -262,7 +262,7 @@ class _Grid:
         far = np.hypot(*(which - np.indices(known.shape)))
         front = np.where(far <= REGIONS.filled, front[nearest], -1)
         depths = depths[nearest]
-        return _Grid(view, rows, _settled(at, z, depths), at, front, nearest, depths, np.exp(weights))
+        return _Grid(view, rows, _assign_pixels(at, z, depths), at, front, nearest, depths, np.exp(weights))
 
     def colours(self, colours: Float[np.ndarray, "N 3"]) -> Float[np.ndarray, "n 3"]:
         """Mean colour of each pixel."""
@@ -272,7 +272,7 @@ class _Grid:
         return means[self.nearest.ravel()]
 
 
-def _settled(
+def _assign_pixels(
     at: Integer[np.ndarray, " r"], z: Float[np.ndarray, " r"], depths: Float[np.ndarray, "H W"]
 ) -> Integer[np.ndarray, " r"]:
     """The pixels that Gaussians are of: their own, or the one beside it whose depth is theirs, where a jump

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from langflash_core.base.records import FoundLens, Guess, Record, World, check_light, world_to_json
-from langflash_core.scene.container import damaged, read_container
+from langflash_core.scene.container import damage_error, read_container
 from langflash_core.scene.doubts import told_warnings
 from langflash_core.scene.record import from_json
 from langflash_core.scene.settings import REPORT
@@ -51,7 +51,7 @@ def describe_file(path: Path) -> dict:
     try:
         return _document(found.arrays, found.space, found.view_size, from_json(found.metadata))
     except (ValueError, LookupError, TypeError, ArithmeticError) as error:
-        raise damaged(path, error) from error
+        raise damage_error(path, error) from error
 
 
 def detail_line(detail: Mapping[str, Any], now: int | None = None) -> str:
@@ -65,8 +65,8 @@ def detail_line(detail: Mapping[str, Any], now: int | None = None) -> str:
             made, where some of them went since. None: it stands alone.
     """
     level = detail.get("level")
-    spent = _joined(", ", level if isinstance(level, str) else "", _elements(detail, now))
-    return _joined(" · ", spent, _bought(detail))
+    spent = _join_words(", ", level if isinstance(level, str) else "", _elements(detail, now))
+    return _join_words(" · ", spent, _bought(detail))
 
 
 def _elements(detail: Mapping[str, Any], now: int | None) -> str:
@@ -79,8 +79,8 @@ def _elements(detail: Mapping[str, Any], now: int | None) -> str:
     if total and sizes and len(sizes) == len(by_size):  # what goes on under finer ones is of no size
         rest = detail["elements"] - sum(by_size.values())
         sizes += [f"behind others {rest:,}"] if rest > 0 else []
-    parts = _joined("; ", _joined(", ", *kinds), _joined(", ", *sizes))
-    return _joined(" ", total, f"({parts})" if parts else "")
+    parts = _join_words("; ", _join_words(", ", *kinds), _join_words(", ", *sizes))
+    return _join_words(" ", total, f"({parts})" if parts else "")
 
 
 def _bought(detail: Mapping[str, Any]) -> str:
@@ -89,7 +89,7 @@ def _bought(detail: Mapping[str, Any]) -> str:
     return f"from the photos' places {here} dB{beside}" if here else ""
 
 
-def _joined(between: str, *parts: str) -> str:
+def _join_words(between: str, *parts: str) -> str:
     return between.join(filter(None, parts))
 
 
@@ -114,7 +114,7 @@ def left_out_line(left_out: Mapping[str, Any], names: Sequence[str] = ()) -> str
             are numbered.
     """
     films = (said.rstrip(".") for said in film_sentences(left_out))
-    return _joined("; ", _shares_line(left_out_shares(left_out), names), _unplaced(left_out), *films)
+    return _join_words("; ", _shares_line(left_out_shares(left_out), names), _unplaced_note(left_out), *films)
 
 
 def left_out_shares(left_out: Mapping[str, Any]) -> tuple[float, ...]:
@@ -150,7 +150,7 @@ def _is_text(value: object) -> bool:
     return isinstance(value, str)
 
 
-def _unplaced(left_out: Mapping[str, Any]) -> str:
+def _unplaced_note(left_out: Mapping[str, Any]) -> str:
     names = unplaced_names(left_out)
     more = f" and {_others(len(names) - REPORT.named)}" if len(names) > REPORT.named else ""
     return f"{', '.join(names[: REPORT.named])}{more} could not be placed" if names else ""

@@ -69,7 +69,7 @@ class Surroundings:
         if self.layers is not None:
             drawn = np.isin(self.views, self.layers.seen(np.array(pose.centre), pose.axes[:, 2]).views)
             return replace(self._only(drawn), layers=None).known(pose)
-        depths, pixels, focal, inside = self._seen(pose)
+        depths, pixels, focal, inside = self._visible_samples(pose)
         places, own = self.places[inside], self.eyes[inside] - self.places[inside]
         ways = np.array(pose.centre) - places
         lengths = np.sqrt(np.einsum("nc,nc->n", ways, ways) * np.einsum("nc,nc->n", own, own))
@@ -91,10 +91,10 @@ class Surroundings:
     def middle(self, pose: Pose) -> float | None:
         """Depth of the middle of what is near in a pose's picture: the median of the nearer half; None where
         it shows nothing."""
-        depths = self._seen(pose)[0]
+        depths = self._visible_samples(pose)[0]
         return float(np.quantile(depths, 0.25)) if len(depths) else None
 
-    def _seen(
+    def _visible_samples(
         self, pose: Pose
     ) -> tuple[Float[np.ndarray, " m"], Float[np.ndarray, "m 2"], float, Integer[np.ndarray, " m"]]:
         """Depths and cells of the samples in a picture, cells per unit at depth 1, and which samples."""
@@ -116,7 +116,7 @@ def surroundings_of(scene: "Scene") -> Surroundings | None:
     means = scene.gaussians.means.detach().cpu().double().numpy()
     views = [view for view in np.unique(ids[solid]).tolist() if view >= 0]
     found = [
-        _sampled(scene, view, np.flatnonzero((ids == view) & solid), means, len(views)) for view in views
+        _sample_photo(scene, view, np.flatnonzero((ids == view) & solid), means, len(views)) for view in views
     ]
     if not any(len(rows) for rows, _, _ in found):
         return None
@@ -126,7 +126,7 @@ def surroundings_of(scene: "Scene") -> Surroundings | None:
     return Surroundings(means[rows], eyes, sizes, rows, ids[rows], depth, layers)
 
 
-def _sampled(
+def _sample_photo(
     scene: "Scene", view: int, own: Integer[np.ndarray, " m"], means: Float[np.ndarray, "N 3"], count: int
 ) -> tuple[Integer[np.ndarray, " n"], Float[np.ndarray, " n"], Float[np.ndarray, "n 3"]]:
     """Rows, sizes and eyes of a photo's samples, of `count` photos: of each cell of its grid the Gaussians at

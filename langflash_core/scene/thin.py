@@ -52,9 +52,9 @@ def thin_with_rows(scene: Scene, share: float) -> tuple[Scene, Int[np.ndarray, "
         return scene, np.arange(len(scene.gaussians))
     coarse = coarse_share(scene)
     if coarse < 1:
-        return _leveled(scene, share, coarse)
+        return _thin_levels(scene, share, coarse)
     chances = inclusion(covered_areas(scene.gaussians), share * len(scene.gaussians))
-    rows = np.sort(_drawn(chances, scene))
+    rows = np.sort(_draw_rows(chances, scene))
     kept = torch.from_numpy(rows)
     growth = torch.from_numpy(chances[rows] ** -0.5).to(scene.gaussians.scales)
     thinned = scene.rows(kept)
@@ -72,7 +72,7 @@ def coarse_level(scene: Scene) -> Scene:
     return thin(scene, _THIRD) if len(scene.gaussians) * _THIRD >= 1 else scene
 
 
-def _leveled(scene: Scene, share: float, coarse: float) -> tuple[Scene, np.ndarray]:
+def _thin_levels(scene: Scene, share: float, coarse: float) -> tuple[Scene, np.ndarray]:
     """`thin_with_rows` of a scene with levels."""
     assert scene.levels is not None
     levels = scene.levels.cpu().numpy()
@@ -84,17 +84,17 @@ def _leveled(scene: Scene, share: float, coarse: float) -> tuple[Scene, np.ndarr
     tells = np.zeros(len(detail))
     for part in _layers(scene):
         own = part[detail]
-        tells[own] = _told(
+        tells[own] = _detail_worth(
             scene.gaussians.rows(torch.from_numpy(closed[part[closed]])),
             fine.gaussians.rows(torch.from_numpy(own)),
         )
     chances = inclusion(tells, share * len(levels) - len(closed))
-    chosen = detail[_drawn(chances, fine)]
+    chosen = detail[_draw_rows(chances, fine)]
     rows = np.sort(np.concatenate((closed, chosen)))
     return scene.rows(torch.from_numpy(rows)), rows
 
 
-def _told(coarse: Gaussians, detail: Gaussians) -> np.ndarray:
+def _detail_worth(coarse: Gaussians, detail: Gaussians) -> np.ndarray:
     """How much each of the detail (n,) changes what the nearest coarse one shows: its area times the mean
     difference of their colours."""
     from scipy.spatial import KDTree
@@ -117,7 +117,7 @@ def _layers(scene: Scene) -> list[np.ndarray]:
     return [views == view for view in np.unique(views)]
 
 
-def _drawn(chances: np.ndarray, scene: Scene) -> np.ndarray:
+def _draw_rows(chances: np.ndarray, scene: Scene) -> np.ndarray:
     """Rows that one draw along a space-filling curve keeps, each with its chance (N,)."""
     along = z_order(scene.gaussians.means.detach().cpu().numpy())
     if scene.layered and scene.view_ids is not None:
@@ -166,11 +166,15 @@ def z_order(means: Float[np.ndarray, "N 3"]) -> Int[np.ndarray, " N"]:
     finite = np.where(np.isfinite(means), means, 0.0).astype(np.float64)
     low, high = np.percentile(finite, (1, 99), axis=0)
     cells = np.clip((finite - low) / np.maximum(high - low, 1e-12) * _CELLS, 0, _CELLS - 1).astype(np.uint32)
-    code = _spread(cells[:, 0]) | _spread(cells[:, 1]) << np.uint32(1) | _spread(cells[:, 2]) << np.uint32(2)
+    code = (
+        _spread_bits(cells[:, 0])
+        | _spread_bits(cells[:, 1]) << np.uint32(1)
+        | _spread_bits(cells[:, 2]) << np.uint32(2)
+    )
     return np.argsort(code, kind="stable")
 
 
-def _spread(bits: np.ndarray) -> np.ndarray:
+def _spread_bits(bits: np.ndarray) -> np.ndarray:
     """Ten bits to every third place of thirty."""
     for shift, mask in ((16, 0x030000FF), (8, 0x0300F00F), (4, 0x030C30C3), (2, 0x09249249)):
         bits = (bits | bits << np.uint32(shift)) & np.uint32(mask)

@@ -70,7 +70,7 @@ class Tour:
         """
         stops = list(self.stops)
         stops.insert(len(stops) if place is None else place, stop)
-        return checked(replace(self, stops=tuple(stops)))
+        return check_tour(replace(self, stops=tuple(stops)))
 
     def with_note(self, note: Note) -> "Tour":
         """With one more.
@@ -78,7 +78,7 @@ class Tour:
         Raises:
             InputError: it says nothing, or there are too many.
         """
-        return checked(replace(self, notes=(*self.notes, note)))
+        return check_tour(replace(self, notes=(*self.notes, note)))
 
     def changed_stop(self, place: int, **changes: Any) -> "Tour":
         """With other values of one stop; the start keeps being what it was.
@@ -89,7 +89,7 @@ class Tour:
         old, stops = self.stops[place], list(self.stops)
         stops[place] = replace(old, **changes)
         start = stops[place].name if self.start == old.name else self.start
-        return checked(replace(self, stops=tuple(stops), start=start))
+        return check_tour(replace(self, stops=tuple(stops), start=start))
 
     def moved_stop(self, place: int, to: int) -> "Tour":
         """With a stop at another place, from 0."""
@@ -113,13 +113,13 @@ class Tour:
         Raises:
             InputError: there is no such stop.
         """
-        return checked(replace(self, start=name))
+        return check_tour(replace(self, start=name))
 
 
 NO_TOUR = Tour()
 
 
-def checked(tour: Tour) -> Tour:
+def check_tour(tour: Tour) -> Tour:
     """The tour, its words trimmed.
 
     Raises:
@@ -193,7 +193,7 @@ def read_tour(told: Mapping[str, Any]) -> Tour:
     try:
         stops = tuple(_stop(entry) for entry in _entries(told, "stops"))
         notes = tuple(_note(entry) for entry in _entries(told, "notes"))
-        return checked(Tour(stops, notes, _text(told, "start")))
+        return check_tour(Tour(stops, notes, _text(told, "start")))
     except InputError as error:
         raise ValueError(f"tour: {error}") from error
     except (KeyError, TypeError, IndexError, AttributeError, OverflowError) as error:

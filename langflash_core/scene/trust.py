@@ -50,7 +50,7 @@ def check_photos(scene: Scene) -> None:
         raise InputError("this scene does not say which photos it was made of; leave --fade out")
 
 
-def faded(frame: Frame, camera: Camera, scene: Scene) -> Frame:
+def fade_untrusted(frame: Frame, camera: Camera, scene: Scene) -> Frame:
     """A frame over black that fades where it shows what no photo looked at from about there.
 
     Colours, alphas and weight maps are multiplied by `trust`, so that what is not to be trusted is not

@@ -15,10 +15,10 @@ def sparse_weights(
     clean = dense.float()
     finite = (clean * 0).sum(-1, keepdim=True) == 0  # as isfinite tells, in a third of the time
     values, ids = torch.where(finite, clean, 0.0).clamp_min(0).topk(min(top_m, dense.shape[1]), dim=-1)
-    return ids, renormalised(values)
+    return ids, renormalise(values)
 
 
-def renormalised(values: Float[Tensor, "n m"]) -> Float[Tensor, "n m"]:
+def renormalise(values: Float[Tensor, "n m"]) -> Float[Tensor, "n m"]:
     """Rows (n, m) >= 0 scaled to sum 1; rows of zeros stay."""
     sums = values.sum(-1, keepdim=True)
     return torch.where(sums > 0, values / sums.clamp_min(1e-12), 0.0)

@@ -28,11 +28,11 @@ def in_world(scene: Scene, viewmat: Float[Tensor, "4 4"], unit: float) -> Scene:
     means = transform(pose, scene.gaussians.means.double() * unit).float()
     viewmats = scene.viewmats.double().clone()
     viewmats[:, :3, 3] *= unit
-    moved = _turned(scene.gaussians, means, pose[:3, :3], unit)
+    moved = _transform_gaussians(scene.gaussians, means, pose[:3, :3], unit)
     return replace(scene, gaussians=moved, viewmats=(viewmats @ viewmat.double().cpu()).float())
 
 
-def placed(
+def transform_scene(
     scene: Scene, turn: Float[np.ndarray, "3 3"], origin: Float[np.ndarray, " 3"], unit: float
 ) -> Scene:
     """The scene with every point p at unit turn (p - origin); its views look at the same things.
@@ -46,7 +46,7 @@ def placed(
     rotation = viewmats[:, :3, :3] @ matrix.T
     viewmats[:, :3, 3] = unit * (viewmats[:, :3, 3] + viewmats[:, :3, :3] @ start)
     viewmats[:, :3, :3] = rotation
-    moved = _turned(scene.gaussians, means, matrix, unit)
+    moved = _transform_gaussians(scene.gaussians, means, matrix, unit)
     path = tuple(_placed_key(key, turn, origin, unit) for key in scene.record.camera_path)
     tour = _placed_tour(scene.record.tour, turn, origin, unit)
     whole = replace(scene, gaussians=moved, viewmats=viewmats.float())
@@ -64,7 +64,7 @@ def upward(world: World | None) -> Float[np.ndarray, " 3"]:
     return np.array([0.0, -1.0, 0.0]) if world is None else -turn_of(world)[1]
 
 
-def _turned(gaussians: Gaussians, means: Tensor, matrix: Tensor, unit: float) -> Gaussians:
+def _transform_gaussians(gaussians: Gaussians, means: Tensor, matrix: Tensor, unit: float) -> Gaussians:
     """At these means, turned and scaled."""
     quats = torch.nn.functional.normalize(turned_quats(gaussians.quats, matrix), dim=-1)
     sh = turned_sh(gaussians.sh, matrix)

@@ -10,7 +10,7 @@ import numpy as np
 from langflash_core.errors import InputError, PromptError, ViewError
 from langflash_core.geometry.poses import Pose, Vector, from_view
 from langflash_core.geometry.reach import median_reach
-from langflash_core.scene.container import Container, damaged, read_container, write_container
+from langflash_core.scene.container import Container, damage_error, read_container, write_container
 from langflash_core.scene.tour import Tour, read_tour, told_tour
 
 if TYPE_CHECKING:
@@ -29,7 +29,7 @@ def tour_in(path: Path) -> tuple[Tour, Container]:
     try:
         return read_tour(found.metadata.get(_TOUR) or {}), found
     except ValueError as error:
-        raise damaged(path, error) from error
+        raise damage_error(path, error) from error
 
 
 def write_tour(tour: Tour, found: Container, path: Path) -> None:

@@ -23,7 +23,7 @@ _PAIRS_AT_ONCE = 1 << 17  # times K floats of memory: 33 MB for K = 64
 
 
 @torch.no_grad()
-def gathered(
+def backproject(
     gaussians: Gaussians,
     camera: Camera,
     values: Float[Tensor, "H W K"],

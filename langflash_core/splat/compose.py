@@ -69,7 +69,7 @@ def shares(
     return blend / blend.sum(0).clamp_min(1e-30)
 
 
-def blended(frames: Sequence[Frame], weights: Float[np.ndarray, " L"]) -> Frame:
+def blend_layers(frames: Sequence[Frame], weights: Float[np.ndarray, " L"]) -> Frame:
     """One picture of those of layers over black, by `shares`.
 
     Args:
@@ -112,7 +112,7 @@ def render(
     if not parts:
         return reference.render(scene, camera, background=background, weight_maps=weight_maps)
     frames = [reference.render(part, camera, weight_maps=weight_maps) for part in parts]
-    frame = blended(frames, weights)
+    frame = blend_layers(frames, weights)
     under = torch.tensor(background).to(frame.rgb)
     return replace(frame, rgb=frame.rgb + (1 - frame.alphas[..., None]) * under)
 

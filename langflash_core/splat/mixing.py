@@ -51,9 +51,9 @@ def mixing(
         alphas, pixels, starts = _pairs(table, rows, camera, faint, clear)
         by_depth = scipy.sparse.csc_array((alphas, pixels, starts), shape=(len(light), len(rows)))
         by_pixel = by_depth.tocsr()  # columns of a row ascend: front to back
-        shares, columns, counts = _composited(by_pixel, small, light)
+        shares, columns, counts = _composite(by_pixel, small, light)
         layers.append((shares, rows[columns], counts))
-    shares, columns, ends = _joined(layers)
+    shares, columns, ends = _join_slabs(layers)
     ids = footprints.ids.cpu().numpy().astype(np.int32)
     return scipy.sparse.csr_matrix((shares, ids[columns], ends), shape=(len(light), count))
 
@@ -63,7 +63,7 @@ def _slabs(count: int) -> int:
     return min(max(count // MIXING.least_slab, 1), MIXING.slabs)
 
 
-def _joined(
+def _join_slabs(
     layers: Sequence[tuple[np.ndarray, np.ndarray, np.ndarray]],
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Rows of slabs one behind the other: shares, columns, and where each pixel's begin.
@@ -199,7 +199,7 @@ def _between(places: np.ndarray, size: int) -> np.ndarray:
     return (places >= 0) & (places < size)
 
 
-def _composited(
+def _composite(
     rows: scipy.sparse.csr_array, small: float, light: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """T alpha of alphas sorted by pixel and depth, their columns, and how many each pixel has; those below

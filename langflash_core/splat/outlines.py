@@ -30,7 +30,7 @@ def outlines(
     """
     ratio = min(1.0, OUTLINES.side / max(camera.width, camera.height))
     size = max(1, round(camera.width * ratio)), max(1, round(camera.height * ratio))
-    mask = silhouette(scene, visible, part, camera.resized(*size))
+    mask = silhouette(scene, visible, part, camera.with_size(*size))
     found, _ = cv2.findContours(mask.astype(np.uint8), cv2.RETR_CCOMP, cv2.CHAIN_APPROX_NONE)
     scale = np.array([camera.width / size[0], camera.height / size[1]])
     lines = [
@@ -43,7 +43,7 @@ def silhouette(
     scene: Scene, visible: Bool[np.ndarray, " N"], part: Bool[np.ndarray, " N"], camera: Camera
 ) -> Bool[np.ndarray, "H W"]:
     """The camera's pixels (H, W) that show a part."""
-    rows = np.flatnonzero(visible & _drawn(scene, camera))
+    rows = np.flatnonzero(visible & _drawn_gaussians(scene, camera))
     none = np.zeros((camera.height, camera.width), bool)
     if not (part & visible).any():
         return none
@@ -81,7 +81,7 @@ def _nearest(
     return np.where(depths < 3e38, depths, np.inf)
 
 
-def _drawn(scene: Scene, camera: Camera) -> Bool[np.ndarray, " N"]:
+def _drawn_gaussians(scene: Scene, camera: Camera) -> Bool[np.ndarray, " N"]:
     """What a picture is made of."""
     near = Nearness.of(scene) if scene.layered else None
     if near is None or not near.views or scene.view_ids is None:

@@ -51,7 +51,7 @@ def seen_in(
         visible = visible & _may_touch(scene.gaussians, camera, pixels)
     if near is not None and near.views and pixels.shape == (camera.height, camera.width):
         return _seen_in_layers(scene, near, visible, camera, pixels)
-    rows, shown = _shown(scene.gaussians, visible)
+    rows, shown = _visible_gaussians(scene.gaussians, visible)
     parts = contributions(shown, camera, torch.from_numpy(pixels), through=through)
     found = np.zeros(len(visible), bool)
     found[rows[parts >= SEEN].numpy()] = True
@@ -91,7 +91,7 @@ def _seen_in_layers(
     """`seen_in` of a scene of layers."""
     chosen, layers = near.chosen(camera), {}
     for view in near.views:
-        rows, shown = _shown(scene.gaussians, visible & _of_layer(scene, view))
+        rows, shown = _visible_gaussians(scene.gaussians, visible & _of_layer(scene, view))
         matrix = mixing(project(shown, camera), camera, len(rows), ALPHA_MIN, 0.0, pixels)[pixels.ravel()]
         layers[view] = rows.numpy(), matrix, view_depths(shown, camera).nan_to_num(0, 0, 0).numpy()
     drawn = [layers[view] for view in chosen.views]
@@ -158,7 +158,7 @@ def weights_at(semantics: Semantics, seen: tuple[Sight, ...], x: int, y: int) ->
 
 
 def _sight(scene: Scene, visible: np.ndarray, camera: Camera, weight: float) -> Sight:
-    rows, shown = _shown(scene.gaussians, visible)
+    rows, shown = _visible_gaussians(scene.gaussians, visible)
     return Sight(rows, project(shown, camera), view_depths(shown, camera).nan_to_num(0, 0, 0), weight)
 
 
@@ -168,6 +168,6 @@ def _of_layer(scene: Scene, view: int) -> Bool[np.ndarray, " N"]:
     return (ids == view) | (ids < 0)
 
 
-def _shown(gaussians: Gaussians, visible: np.ndarray) -> tuple[Tensor, Gaussians]:
+def _visible_gaussians(gaussians: Gaussians, visible: np.ndarray) -> tuple[Tensor, Gaussians]:
     rows = torch.from_numpy(np.flatnonzero(visible))
     return rows, gaussians.map(lambda values: values[rows].double())

@@ -79,11 +79,11 @@ def rasterize_tiles(
                 pass
     finally:
         torch.set_num_threads(before)  # it is also what threads begin with that first compute after this
-    *maps, alphas = (_untiled(image, lists.grid)[: camera.height, : camera.width] for image in images)
+    *maps, alphas = (_merge_tiles(image, lists.grid)[: camera.height, : camera.width] for image in images)
     return maps, alphas[..., 0]
 
 
-def _untiled(image: Tensor, grid: tuple[int, int]) -> Tensor:
+def _merge_tiles(image: Tensor, grid: tuple[int, int]) -> Tensor:
     """(tiles, 64, F) to (H, W, F), whole tiles."""
     columns, rows = grid
     image = image.view(rows, columns, TILES.tile, TILES.tile, -1).permute(0, 2, 1, 3, 4)
@@ -196,27 +196,27 @@ def _composite(table: _Table, lists: _Lists, tiles: Tensor, images: list[Tensor]
     first = 0
     while len(tiles):
         place = torch.arange(first, first + TILES.block)
-        index = _picked(lists.members, (starts[:, None] + place).clamp_max_(len(lists.members) - 1))
+        index = _gather_rows(lists.members, (starts[:, None] + place).clamp_max_(len(lists.members) - 1))
         index.masked_fill_(place >= counts[:, None], nobody)
-        weights = _alphas(_picked(table.shapes, index), xs, ys)
+        weights = _alphas(_gather_rows(table.shapes, index), xs, ys)
         for i in range(TILES.block):
             passing.sub_(weights[:, i].mul_(passing))  # T alpha; T (1 - alpha) = T - T alpha
-        sums.baddbmm_(weights.transpose(1, 2), _picked(table.features, index))
+        sums.baddbmm_(weights.transpose(1, 2), _gather_rows(table.features, index))
         first += TILES.block
         going = (counts > first) & (passing.amax(1) > TILES.stop)
         if int(going.sum()) <= TILES.worth_packing * len(tiles):
             done = ~going
-            _put(images, tiles[done], sums[done])
+            _scatter_tiles(images, tiles[done], sums[done])
             tiles, xs, ys, starts, counts = (v[going] for v in (tiles, xs, ys, starts, counts))
             passing, sums = passing[going], sums[going]
 
 
-def _picked(values: Tensor, index: Tensor) -> Tensor:
+def _gather_rows(values: Tensor, index: Tensor) -> Tensor:
     """`values[index]` of an index (B, n), which `index_select` finds in half the time."""
     return values.index_select(0, index.flatten()).unflatten(0, index.shape)
 
 
-def _put(images: list[Tensor], tiles: Tensor, sums: Tensor) -> None:
+def _scatter_tiles(images: list[Tensor], tiles: Tensor, sums: Tensor) -> None:
     first = 0
     for image in images:
         wide = image.shape[-1]

@@ -1,2 +1,2 @@
 """A prediction becomes a scene: exposure compensation, transient masks, elements, colours (`fine`); one
-surface of all layers where a format needs one (`fused`)."""
+surface of all layers where a format needs one (`fuse_layers`)."""

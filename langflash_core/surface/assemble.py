@@ -67,7 +67,7 @@ def assemble(prediction: Prediction, views: Views, *, top_m: int = 8, preset: st
         network_unit=unit,
     )
     scene = Scene(
-        gaussians=normalised(prediction.gaussians.map(lambda values: values[keep]), unit),
+        gaussians=normalise_gaussians(prediction.gaussians.map(lambda values: values[keep]), unit),
         semantics=_semantics(prediction, keep.view(num_views, -1), top_m),
         viewmats=scaled_poses(prediction.viewmats, unit),
         Ks=views.Ks.to(prediction.viewmats).clone(),
@@ -147,7 +147,7 @@ def _usable(gaussians: Gaussians) -> Tensor:
     return keep
 
 
-def normalised(gaussians: Gaussians, unit: float) -> Gaussians:
+def normalise_gaussians(gaussians: Gaussians, unit: float) -> Gaussians:
     """In units of `unit`, quaternions of unit norm, scales not below `PRUNING.min_scale`."""
     norms = gaussians.quats.float().norm(dim=-1, keepdim=True)
     identity = torch.tensor([1.0, 0, 0, 0], device=norms.device)
@@ -167,7 +167,7 @@ def _semantics(prediction: Prediction, keep: Tensor, top_m: int) -> Semantics:
 
     View by view: tables of all pixels times all atoms are what memory and time go into.
     """
-    finite = directed(prediction.dictionary)
+    finite = has_direction(prediction.dictionary)
     of_views = [
         sparse_weights(maps.flatten(1)[finite].T[own], top_m)
         for maps, own in zip(prediction.weights, keep, strict=True)
@@ -175,7 +175,7 @@ def _semantics(prediction: Prediction, keep: Tensor, top_m: int) -> Semantics:
     return semantics_of(prediction, of_views)
 
 
-def directed(dictionary: Float[Tensor, "K C"]) -> Bool[Tensor, " K"]:
+def has_direction(dictionary: Float[Tensor, "K C"]) -> Bool[Tensor, " K"]:
     """(K,) bool: atoms (K, C) that have a direction."""
     return torch.isfinite(dictionary).all(-1) & (dictionary.norm(dim=-1) > 1e-6)
 
@@ -186,7 +186,7 @@ def semantics_of(
     """Over the atoms that have a direction, of ids and values (n, m) of each view's Gaussians over those."""
     ids, values = (torch.cat(parts) for parts in zip(*of_views, strict=True))
     ids = ids.long()
-    dictionary = prediction.dictionary[directed(prediction.dictionary)]
+    dictionary = prediction.dictionary[has_direction(prediction.dictionary)]
     return Semantics(ids, values, normalize(dictionary.float(), dim=-1), prediction.space)
 
 

@@ -49,7 +49,7 @@ class Squares:
         return len(self.left)
 
 
-def grown(
+def grow_tree(
     photo: Float[Tensor, "3 h w"],
     log_depths: Float[Tensor, "h w"],
     clear: Float[Tensor, "h w"],
@@ -64,11 +64,11 @@ def grown(
         finest: pixels, side of the smallest squares, a power of two.
     """
     size = (photo.shape[-2], photo.shape[-1])
-    colours, depths = padded(photo), padded(log_depths[None])[0]
-    needed = padded(wanted[None].float())[0]
+    colours, depths = pad_to_blocks(photo), pad_to_blocks(log_depths[None])[0]
+    needed = pad_to_blocks(wanted[None].float())[0]
     needed[size[0] :], needed[:, size[1] :] = 0, 0
     jumps = (depths.diff(dim=1).abs() > UPSAMPLING.jump, depths.diff(dim=0).abs() > UPSAMPLING.jump)
-    near = -padded(clear.clamp(max=4 * LARGEST)[None])
+    near = -pad_to_blocks(clear.clamp(max=4 * LARGEST)[None])
     squares, errors = colours.square().sum(0), torch.zeros_like(depths)
     gains: list[Tensor] = []
     wanteds = [needed > 0]
@@ -81,7 +81,7 @@ def grown(
         must = (
             (-near[0] < BLOCKS.clear[side >= 4] * side)
             | _jumping(jumps, level)
-            | (_bent(depths, side) if level > 1 else gain < 0)
+            | (_is_bent(depths, side) if level > 1 else gain < 0)
         )
         if side > 4:
             must |= (needed > 0) & (needed < side**2)
@@ -127,7 +127,7 @@ def leaves(tree: Tree, limit: float) -> tuple[list[Squares], Squares]:
     return found[::-1], beneath
 
 
-def padded(values: Shaped[Tensor, "C H W"]) -> Shaped[Tensor, "C h w"]:
+def pad_to_blocks(values: Shaped[Tensor, "C H W"]) -> Shaped[Tensor, "C h w"]:
     """(C, h, w) with its last row and column repeated up to multiples of `LARGEST`."""
     height, width = values.shape[-2:]
     return F.pad(values[None], (0, -width % LARGEST, 0, -height % LARGEST), mode="replicate")[0]
@@ -147,7 +147,7 @@ def _jumping(jumps: tuple[Tensor, Tensor], level: int) -> Tensor:
     return F.max_pool2d(inside[None, None], side)[0, 0] > 0
 
 
-def _bent(depths: Tensor, side: int) -> Tensor:
+def _is_bent(depths: Tensor, side: int) -> Tensor:
     """Squares whose middle is off the mean of their corners."""
     first, last, half = slice(0, None, side), slice(side - 1, None, side), slice(side // 2, None, side)
     corners = depths[first, first] + depths[first, last] + depths[last, first] + depths[last, last]

@@ -117,10 +117,10 @@ def refined_weights(
     Returns:
         What `at` and `dense` read. On the CPU.
     """
-    own = _sharpened(weights.detach().cpu().float(), rule.sharpness)
+    own = _sharpen_weights(weights.detach().cpu().float(), rule.sharpness)
     picture, photo = (torch.nan_to_num(p.detach().cpu().float()).clamp(0, 1) for p in (image, photo))
     values = own.permute(1, 2, 0).contiguous().numpy()  # (H, W, K)
-    down, across = _likeness(quieted(picture.numpy(), rule.noise), rule.edge)
+    down, across = _likeness(denoise(picture.numpy(), rule.noise), rule.edge)
     for share in _shares(rule.rounds):
         _Lines.of(across.T * (share * rule.reach)).solve(values.swapaxes(0, 1))
         _Lines.of(down * (share * rule.reach)).solve(values)
@@ -161,7 +161,7 @@ class _Lines:
             values[i] += step
 
 
-def quieted(picture: Float32[np.ndarray, "3 H W"], noise: float) -> Float32[np.ndarray, "3 H W"]:
+def denoise(picture: Float32[np.ndarray, "3 H W"], noise: float) -> Float32[np.ndarray, "3 H W"]:
     """The picture without its noise, edges as they were: a bilateral filter of `BORDERS.window` pixels.
 
     Source: Tomasi and Manduchi, Bilateral Filtering for Gray and Color Images, ICCV 1998.
@@ -186,7 +186,7 @@ def _shares(rounds: int) -> list[float]:
     return [1.5 * 4.0 ** (rounds - 1 - turn) / (4.0**rounds - 1) for turn in range(rounds)]
 
 
-def _sharpened(weights: Float32[Tensor, "K H W"], power: float) -> Float32[Tensor, "K H W"]:
+def _sharpen_weights(weights: Float32[Tensor, "K H W"], power: float) -> Float32[Tensor, "K H W"]:
     """w^power, sums 1 again."""
     if len(weights) == 0:
         return weights

@@ -54,10 +54,10 @@ def solved_colours(
     """
     first = start.detach().cpu().numpy().astype(np.float32)
     footprints = project(gaussians.map(lambda values: values.float()), camera)
-    some, matrix = _narrowed(mixing(footprints, camera, len(first)))
+    some, matrix = _drop_empty_columns(mixing(footprints, camera, len(first)))
     drawn = _Drawn.of(matrix, photo)
     colours, seen = first.copy(), np.zeros(len(first), np.float32)
-    colours[some], seen[some] = drawn.solved(first[some], rounds), drawn.sums[:, 0]
+    colours[some], seen[some] = drawn.solve(first[some], rounds), drawn.sums[:, 0]
     psnr = drawn.psnr(first[some]), drawn.psnr(colours[some])
     return Solved(torch.from_numpy(colours), torch.from_numpy(seen), psnr)
 
@@ -84,7 +84,7 @@ class _Drawn:
         sums = matrix.T @ np.ones((len(flat), 1), np.float32)
         return _Drawn(matrix, flat, shown[:, None].astype(np.float32), sums)
 
-    def solved(self, start: np.ndarray, rounds: int) -> np.ndarray:
+    def solve(self, start: np.ndarray, rounds: int) -> np.ndarray:
         """Colours (n, 3) after some rounds."""
         steps = np.where(self.sums > COLOURS.seen, 1 / np.maximum(self.sums, COLOURS.seen), 0)
         colours = ahead = start
@@ -107,7 +107,7 @@ class _Drawn:
         return -10 * math.log10(max(mean, 1e-10))
 
 
-def _narrowed(matrix: scipy.sparse.csr_matrix) -> tuple[np.ndarray, scipy.sparse.csr_matrix]:
+def _drop_empty_columns(matrix: scipy.sparse.csr_matrix) -> tuple[np.ndarray, scipy.sparse.csr_matrix]:
     """Which columns of a matrix are not empty, and the matrix of these."""
     rows, columns = matrix.get_shape()
     used = np.zeros(columns, bool)

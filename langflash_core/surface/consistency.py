@@ -37,7 +37,7 @@ def seen_through(
     return blocked.view_as(rig.depths)
 
 
-def outvoted(rig: Rig) -> Bool[Tensor, "V H W"]:
+def outvoted_pixels(rig: Rig) -> Bool[Tensor, "V H W"]:
     """(V, H, W) bool: what lies beside a jump of depth, where two other photos and more see through it, and
     more than see it as their surface.
 

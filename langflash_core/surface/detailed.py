@@ -19,15 +19,15 @@ from langflash_core.base.memory import give_back
 from langflash_core.geometry.cameras import world_points
 from langflash_core.scene.weights import sparse_weights
 from langflash_core.surface.assemble import (
-    directed,
+    has_direction,
     mean_distance,
-    normalised,
+    normalise_gaussians,
     placed_views,
     scaled_poses,
     semantics_of,
     unplaced_photos,
 )
-from langflash_core.surface.blocks import LEVELS, Tree, grown, leaves, threshold
+from langflash_core.surface.blocks import LEVELS, Tree, grow_tree, leaves, threshold
 from langflash_core.surface.borders import refined_weights
 from langflash_core.surface.clearance import clearances
 from langflash_core.surface.elements import (
@@ -35,13 +35,13 @@ from langflash_core.surface.elements import (
     Elements,
     drawn_in,
     ground,
-    joined,
+    join_elements,
     of_squares,
-    placed,
+    place_elements,
     under,
 )
 from langflash_core.surface.settings import LAYERS
-from langflash_core.surface.upsampling import Upsampled, upsampled
+from langflash_core.surface.upsampling import Upsampled, upsample_depths
 from langflash_core.types import Camera, Cost, Gaussians, Prediction, Record, Scene, Views
 
 
@@ -96,14 +96,16 @@ def assemble_detailed(
     prediction, views = placed_views(prediction, views)
     if not bool(torch.isfinite(prediction.viewmats).all()):
         raise ValueError("viewmats: expected finite poses, received others")
-    known, keep, unit = _kept(prediction, views, transients)
+    known, keep, unit = _valid_depths(prediction, views, transients)
     sights = _Sights(lambda v: _Sight.of(photos[v], views.images[v], known[v].log(), keep[v]), len(photos))
     budget = gaussians or min(round(detail.most * int(keep.sum())), LAYERS.most_gaussians)
     covers, limit = _covers(sights, detail, budget, 0.0 if gaussians else detail.gain, progress)
-    made, weights, parts = _made(prediction, views, _told(sights, progress, 0.5), covers, limit, top_m)
+    made, weights, parts = _make_gaussians(
+        prediction, views, _with_progress(sights, progress, 0.5), covers, limit, top_m
+    )
     size = sights[0].size
     scene = Scene(
-        gaussians=normalised(made, unit),
+        gaussians=normalise_gaussians(made, unit),
         semantics=semantics_of(prediction, weights),
         viewmats=scaled_poses(prediction.viewmats, unit),
         Ks=views.Ks.clone(),
@@ -118,7 +120,7 @@ def assemble_detailed(
             photos=views.names,
             warnings=(*views.warnings, *prediction.warnings),
             counts={"predicted": keep.numel(), "covered": int(keep.sum())},
-            detail=_spent(joined(parts), detail, budget, size),
+            detail=_spending_record(join_elements(parts), detail, budget, size),
             left_out=left_out,
             network_unit=unit,
         ),
@@ -130,7 +132,7 @@ def assemble_detailed(
 T = TypeVar("T")
 
 
-def _told(photos: Sequence[T], progress: Callable[[float], None], begin: float) -> Iterator[T]:
+def _with_progress(photos: Sequence[T], progress: Callable[[float], None], begin: float) -> Iterator[T]:
     """One after the other, each told before; half of the whole from `begin` on."""
     for number in range(len(photos)):
         progress(begin + number / len(photos) / 2)
@@ -152,7 +154,7 @@ class _Sight:
     @staticmethod
     def of(photo: Tensor, image: Tensor, log_depths: Tensor, keep: Tensor) -> "_Sight":
         wanted = F.interpolate(keep[None, None].float(), size=photo.shape[-2:], mode="nearest")[0, 0] > 0
-        depth = upsampled(log_depths, image, photo)
+        depth = upsample_depths(log_depths, image, photo)
         return _Sight(photo, image, log_depths, depth, clearances(depth.log_depths), wanted)
 
     @property
@@ -184,7 +186,9 @@ class _Sights(Sequence[_Sight]):
         return self._known[index]
 
 
-def _kept(prediction: Prediction, views: Views, transients: Tensor | None) -> tuple[Tensor, Tensor, float]:
+def _valid_depths(
+    prediction: Prediction, views: Views, transients: Tensor | None
+) -> tuple[Tensor, Tensor, float]:
     """Depths (V, H, W) with what is no number put right; cells (V, H, W) bool that get elements; the scene's
     unit."""
     usable = torch.isfinite(prediction.depths) & (prediction.depths > 0)
@@ -205,7 +209,7 @@ class _Cover:
 
     @staticmethod
     def of(sight: _Sight, finest: int) -> "_Cover":
-        tree = grown(sight.photo, sight.depth.log_depths, sight.clear, sight.wanted, finest)
+        tree = grow_tree(sight.photo, sight.depth.log_depths, sight.clear, sight.wanted, finest)
         behind = under(sight.log_depths, sight.image, sight.size)
         grid = sight.image.shape[1:]
         row, column = behind.cells // grid[1], behind.cells % grid[1]
@@ -219,12 +223,12 @@ def _covers(
 ) -> tuple[list[_Cover], float]:
     """What covers each photo, and the threshold by which all together have at most about `budget` elements,
     each of which gains `least`."""
-    covers = [_Cover.of(sight, detail.finest) for sight in _told(sights, progress, 0.0)]
+    covers = [_Cover.of(sight, detail.finest) for sight in _with_progress(sights, progress, 0.0)]
     left = budget - sum(len(cover.behind) for cover in covers)
     return covers, threshold([cover.tree for cover in covers], left, least)
 
 
-def _made(
+def _make_gaussians(
     prediction: Prediction,
     views: Views,
     sights: Iterable[_Sight],
@@ -234,12 +238,12 @@ def _made(
 ) -> tuple[Gaussians, list[tuple[Tensor, Tensor]], list[Elements]]:
     """All photos' Gaussians in the world, in the prediction's unit; weights of each photo's, which end where
     it has borders (`borders`); and its elements. A photo at a time."""
-    known = directed(prediction.dictionary)
+    known = has_direction(prediction.dictionary)
     made, weights, parts = [], [], []
     for view, (sight, cover) in enumerate(zip(sights, covers, strict=True)):
         part = _of_view(sight, cover, limit)
         camera = Camera(prediction.viewmats[view], views.Ks[view], *views.size)
-        made.append(placed(part, sight.log_depths, sight.depth.slopes, camera, sight.size))
+        made.append(place_elements(part, sight.log_depths, sight.depth.slopes, camera, sight.size))
         refined = refined_weights(prediction.weights[view][known].float(), sight.image, sight.photo)
         width = sight.size[1]
         ids, values = sparse_weights(refined.at(part.pixels // width, part.pixels % width), top_m)
@@ -256,7 +260,7 @@ def _of_view(sight: _Sight, cover: _Cover, limit: float) -> Elements:
     squares, beneath = leaves(cover.tree, limit)
     parts = [of_squares(some, sight.photo, sight.depth) for some in squares if len(some)]
     parts.append(ground(beneath, sight.photo, sight.depth))
-    return joined([*(drawn_in(part, sight.clear) for part in parts), cover.behind])
+    return join_elements([*(drawn_in(part, sight.clear) for part in parts), cover.behind])
 
 
 def _confidences(prediction: Prediction, parts: list[Elements]) -> Tensor:
@@ -264,7 +268,7 @@ def _confidences(prediction: Prediction, parts: list[Elements]) -> Tensor:
     return torch.cat([own[part.cells] for own, part in zip(maps, parts, strict=True)]).clamp(0, 1)
 
 
-def _spent(elements: Elements, detail: Detail, budget: int, size: tuple[int, int]) -> dict:
+def _spending_record(elements: Elements, detail: Detail, budget: int, size: tuple[int, int]) -> dict:
     """What the record says of it."""
     coarse = int((elements.levels == COARSE).sum())
     squares = elements.sides[

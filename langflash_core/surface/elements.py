@@ -24,7 +24,7 @@ from langflash_core.geometry.harmonics import colour_to_sh
 from langflash_core.geometry.pinhole import from_pixels
 from langflash_core.geometry.quaternions import matrices_to_quats
 from langflash_core.geometry.surfels import ellipses, spans, towards_nearer
-from langflash_core.surface.blocks import Squares, padded
+from langflash_core.surface.blocks import Squares, pad_to_blocks
 from langflash_core.surface.settings import COVERING, UPSAMPLING
 from langflash_core.surface.upsampling import Upsampled
 from langflash_core.types import Camera, Gaussians
@@ -57,7 +57,7 @@ class Elements:
         return Elements(*(getattr(self, f.name)[keep] for f in fields(self)))
 
 
-def joined(parts: list[Elements]) -> Elements:
+def join_elements(parts: list[Elements]) -> Elements:
     """All of several."""
     return Elements(*(torch.cat([getattr(p, f.name) for p in parts]) for f in fields(Elements)))
 
@@ -90,7 +90,7 @@ def _middle_depths(log_depths: Tensor, x: Tensor, y: Tensor) -> Tensor:
 
 def _means(photo: Tensor, left: Tensor, top: Tensor, side: int) -> Tensor:
     """(n, 3) mean colours of squares."""
-    pooled = torch.nn.functional.avg_pool2d(padded(photo)[None], side)[0] if side > 1 else photo
+    pooled = torch.nn.functional.avg_pool2d(pad_to_blocks(photo)[None], side)[0] if side > 1 else photo
     return pooled[:, top // side, left // side].T
 
 
@@ -106,7 +106,7 @@ def ground(squares: Squares, photo: Float[Tensor, "3 h w"], depth: Upsampled) ->
     near = (depths <= (low + high) / 2) | (high - low <= UPSAMPLING.jump)
     corner = torch.stack((squares.left, squares.top), -1)
     parts = (near & inside, ~near & inside)
-    return joined([_ground_of(part, depths, pixels, colours, corner, depth.cells) for part in parts])
+    return join_elements([_ground_of(part, depths, pixels, colours, corner, depth.cells) for part in parts])
 
 
 def _of_squares(first: Tensor, side: int) -> Tensor:
@@ -170,7 +170,7 @@ def under(log_depths: Float[Tensor, "h w"], image: Float[Tensor, "3 H W"], size:
     )  # fmt: skip
 
 
-def placed(
+def place_elements(
     elements: Elements,
     log_depths: Float[Tensor, "H W"],
     slopes: Float[Tensor, "H W"],
@@ -182,7 +182,7 @@ def placed(
     Args:
         log_depths, slopes: (H, W), of the grid. camera: of the grid. size: (h, w) of the photo.
     """
-    K, ratio = camera.resized(size[1], size[0]).K, log_depths.shape[1] / size[1]
+    K, ratio = camera.with_size(size[1], size[0]).K, log_depths.shape[1] / size[1]
     span_u, span_v = _spans(log_depths, camera, size)
     cells = elements.cells
     behind = (COVERING.behind + COVERING.reach * ratio * slopes.flatten()[cells]).clamp(

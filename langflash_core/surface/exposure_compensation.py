@@ -84,7 +84,7 @@ class ExposureCompensation:
         low, high = self.span
         return ExposureCompensation(self.gains / (high - low), (self.offsets - low) / (high - low))
 
-    def corrected(
+    def correct_photos(
         self, images: Float[Tensor, "*V 3 H W"], view: int | None = None
     ) -> Float[Tensor, "*V 3 H W"]:
         """Photos (V, 3, H, W), or the one of `view` (3, H, W), in the light of all; not clipped."""
@@ -135,10 +135,12 @@ def compensate_exposure(rig: Rig) -> ExposureCompensation:
         the identity for a photo that shares nothing with others.
     """
     with torch.no_grad():
-        return solve_compensation(compared(rig.map(lambda values: values.detach().cpu().float())), len(rig))
+        return solve_compensation(
+            compare_photos(rig.map(lambda values: values.detach().cpu().float())), len(rig)
+        )
 
 
-def compared(rig: Rig) -> Pairs:
+def compare_photos(rig: Rig) -> Pairs:
     """The pairs that `compensate_exposure` compares, float32 in."""
     num_views = len(rig)
     if num_views < 2 or min(rig.size) < BLOCK:
@@ -146,13 +148,13 @@ def compared(rig: Rig) -> Pairs:
     blocks = _blocks(rig)
     shared = torch.zeros(num_views, num_views, dtype=torch.int64)
     for view in range(num_views):
-        _, agrees = _carried(blocks, blocks.points[:, blocks.coarse], rig, view)
+        _, agrees = _sample_blocks(blocks, blocks.points[:, blocks.coarse], rig, view)
         shared[:, view] = (agrees & _confident(blocks.own[..., blocks.coarse])).sum(-1)
     both, parts = (shared + shared.T).numpy(), []
     pairs = strongest(np.where(both > 0, both, -np.inf), EXPOSURE.sources)
     for view in sorted({view for pair in pairs for view in pair}):
         chosen = torch.tensor([sum(pair) - view for pair in pairs if view in pair])
-        there, agrees = _carried(blocks, blocks.points[chosen], rig, view)
+        there, agrees = _sample_blocks(blocks, blocks.points[chosen], rig, view)
         own = blocks.own[chosen]
         exposed = (own[:, 3:6] > 0.999) & (there[:, 3:6] > 0.999)
         counted = exposed & (agrees & _confident(own))[:, None]
@@ -180,7 +182,7 @@ def _blocks(rig: Rig) -> _Blocks:
     return _Blocks(maps, every.flatten(2), points, coarse.flatten())
 
 
-def _carried(blocks: _Blocks, points: Tensor, rig: Rig, view: int) -> tuple[Tensor, Tensor]:
+def _sample_blocks(blocks: _Blocks, points: Tensor, rig: Rig, view: int) -> tuple[Tensor, Tensor]:
     """What `view` has (n, 8, p) where points (n, p, 3) lie in it, and whether (n, p) it sees these."""
     seen = rig.project(points.flatten(0, 1).T, view)
     lines, columns = blocks.maps.shape[-2:]
@@ -221,7 +223,7 @@ def _alike(pairs: Pairs, light: ExposureCompensation) -> Tensor:
 
 def _minimum(pairs: Pairs, num_views: int) -> ExposureCompensation:
     """The minimum of the module's sum over these pairs, by linear least squares that are weighted again."""
-    connected = _connected(pairs, num_views)
+    connected = _connected_photos(pairs, num_views)
     gauge = torch.eye(num_views, dtype=torch.float64) - connected / connected.sum(-1, keepdim=True)
     gauge = torch.kron(gauge, torch.eye(2, dtype=torch.float64))  # (3, 2V, 2V)
     prior = torch.tensor([EXPOSURE.log_gain**-2, EXPOSURE.offset**-2], dtype=torch.float64).repeat(num_views)
@@ -233,7 +235,7 @@ def _minimum(pairs: Pairs, num_views: int) -> ExposureCompensation:
         # One after the other: with several threads torch hangs or fails on a batch of large ones (its issue
         # 142815), of 96 photos and more.
         found = found + torch.stack([torch.linalg.solve(*own) for own in zip(normal, right, strict=True)])
-    logs, offsets = _bounded(found.view(3, num_views, 2), connected).unbind(-1)
+    logs, offsets = _bound_gains(found.view(3, num_views, 2), connected).unbind(-1)
     return ExposureCompensation(logs.exp().T.contiguous(), offsets.T.contiguous())
 
 
@@ -279,7 +281,7 @@ def _slopes(offsets: Tensor, scale: Tensor) -> Tensor:
     return torch.stack((one, none, -offsets * scale, scale), -1).unflatten(-1, (2, 2))
 
 
-def _connected(pairs: Pairs, num_views: int) -> Tensor:
+def _connected_photos(pairs: Pairs, num_views: int) -> Tensor:
     """(3, V, V) float64: 1 where pairs of a channel lead from one photo to another, in however many steps."""
     reach = torch.eye(num_views, dtype=torch.float64).repeat(3, 1, 1)
     for first, second, some in zip(pairs.firsts, pairs.seconds, pairs.counted.any(-1).double(), strict=True):
@@ -290,7 +292,7 @@ def _connected(pairs: Pairs, num_views: int) -> Tensor:
     return reach
 
 
-def _bounded(found: Tensor, connected: Tensor) -> Tensor:
+def _bound_gains(found: Tensor, connected: Tensor) -> Tensor:
     """s and o (3, V, 2), where one leaves its range drawn to 0 together with all that are connected to it:
     their means stay 0."""
     limits = torch.tensor([math.log(EXPOSURE.gain_range[1]), EXPOSURE.largest_offset], dtype=torch.float64)

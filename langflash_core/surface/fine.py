@@ -76,7 +76,7 @@ def covered_scene(
     light = compensate_exposure(rig)
     grid = (views.images.shape[-2], views.images.shape[-1])
     photos, whole = _Photos(views, light, grid), _Photos(views, light.whole, grid)
-    views = replace(views, images=light.corrected(views.images).clamp(0, 1))
+    views = replace(views, images=light.correct_photos(views.images).clamp(0, 1))
     rig = rig_of(prediction, views)  # in the light of all
     left = transient_masks(rig)
     bare = left | (False if gaussians else ~_with_layers(prediction)[:, None, None])
@@ -100,10 +100,10 @@ def coloured_scene(covered: Covered, progress: Progress = lambda stage, fraction
     """The scene in the colours of all its photos, without what nobody sees; `progress` as `covered_scene`."""
     solving, left = time.perf_counter(), covered.left
     silent, light = _Silent(covered.photos, left), covered.light
-    scene = _coloured(covered.scene, silent, light, lambda done: progress("colours", 0.4 + 0.5 * done))
+    scene = _colour_layers(covered.scene, silent, light, lambda done: progress("colours", 0.4 + 0.5 * done))
     timings = {**scene.record.cost.timings, "colours": time.perf_counter() - solving}
     shares = _shares(left)
-    said = (*scene.record.warnings, *_told(shares, scene.record.photos))
+    said = (*scene.record.warnings, *_overlap_notes(shares, scene.record.photos))
     left_out = {**scene.record.left_out, **shares}
     record = {"light": covered.light.stored(), "left_out": left_out, "warnings": said}
     scene = scene.with_record(**record, cost=Cost(timings))
@@ -134,7 +134,7 @@ class _Photos(Sequence[Tensor]):
         if index in self._known:
             return self._known[index]
         photo = working_photo(source_picture(self._views, index), self._grid)
-        photo = self._light.corrected(photo, view=index).clamp(0, 1)
+        photo = self._light.correct_photos(photo, view=index).clamp(0, 1)
         if len(self) <= LAYERS.held:
             self._known[index] = photo
         return photo
@@ -184,7 +184,7 @@ def _shares(left: Tensor) -> dict[str, list[float]]:
     return {"shares": shares} if any(shares) else {}
 
 
-def _told(left_out: dict[str, list[float]], names: tuple[str, ...]) -> list[str]:
+def _overlap_notes(left_out: dict[str, list[float]], names: tuple[str, ...]) -> list[str]:
     """Which photos show what others do not, and how much of them that is; nothing of none."""
     count, line = sum(share > 0 for share in left_out.get("shares", ())), left_out_line(left_out, names)
     if count < 2:
@@ -203,7 +203,7 @@ def _with_layers(prediction: Prediction) -> Bool[Tensor, " V"]:
     return torch.zeros(len(poses), dtype=torch.bool).index_fill(0, torch.tensor(kept), True)
 
 
-def _coloured(
+def _colour_layers(
     scene: Scene, photos: _Silent, light: ExposureCompensation, progress: Callable[[float], None]
 ) -> Scene:
     """Each photo's layer in the colours that make that photo (3, h, w) again; the record says how near they

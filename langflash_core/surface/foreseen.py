@@ -60,13 +60,13 @@ def foresight(rig: Rig) -> Foresight:
         pictures = [
             draw_points(rig.points(other), rig.photos[other].flatten(1), camera) for other in chosen.views
         ]
-        picture, shown = _blended(pictures, chosen)
+        picture, shown = _blend_pictures(pictures, chosen)
         alike = _alike(picture, F.avg_pool2d(image, CELL), shown)
         found.append((float(shown.float().mean()), alike, chosen.views[0]))
     return Foresight(*(tuple(column) for column in zip(*found, strict=True)))
 
 
-def _blended(
+def _blend_pictures(
     pictures: Sequence[tuple[Float[Tensor, "3 h w"], Float[Tensor, "h w"]]], chosen: Chosen
 ) -> tuple[Float[Tensor, "3 h w"], Bool[Tensor, "h w"]]:
     """One picture of several, as layers are blended, and where it shows anything."""

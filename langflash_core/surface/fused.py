@@ -24,13 +24,13 @@ from langflash_core.splat.compose import DEPTH
 from langflash_core.splat.mixing import mixing
 from langflash_core.splat.projection import project, view_depths
 from langflash_core.surface.colours import Solved, solved_colours
-from langflash_core.surface.consistency import outvoted, seen_through
+from langflash_core.surface.consistency import outvoted_pixels, seen_through
 from langflash_core.surface.settings import COLOURS
 from langflash_core.surface.view_selection import fill_uncovered, select_views
 from langflash_core.types import Camera, Scene
 
 
-def fused(scene: Scene) -> Scene:
+def fuse_layers(scene: Scene) -> Scene:
     """The scene as one surface; as it is where it has no layers."""
     if not scene.layered:
         return scene
@@ -65,11 +65,11 @@ def _colours(scene: Scene, whole: Scene) -> Float[Tensor, "n 3"]:
 
 def _picture(layer: Scene, camera: Camera) -> Float[Tensor, "3 h w"]:
     """A layer from its photo's place; no number where it shows nothing."""
-    colours, alpha = _drawn(layer, camera, sh_to_colour(layer.gaussians.sh, layer.gaussians.means))
+    colours, alpha = _draw_values(layer, camera, sh_to_colour(layer.gaussians.sh, layer.gaussians.means))
     return torch.where(alpha >= COLOURS.shown, colours, torch.nan)
 
 
-def _drawn(
+def _draw_values(
     layer: Scene, camera: Camera, values: Float[Tensor, "n C"]
 ) -> tuple[Float[Tensor, "C h w"], Float[Tensor, "h w"]]:
     """Means of values of a layer's Gaussians in each pixel, and alpha."""
@@ -138,7 +138,7 @@ def _own_depths(scene: Scene, views: list[int]) -> tuple[Float[Tensor, "L H W"],
 
     def seen(view: int) -> tuple[Tensor, Tensor]:
         layer, camera = scene.layer(view), scene.camera(view)
-        (depth,), alpha = _drawn(layer, camera, view_depths(layer.gaussians, camera)[:, None])
+        (depth,), alpha = _draw_values(layer, camera, view_depths(layer.gaussians, camera)[:, None])
         there = alpha >= COLOURS.shown
         return torch.where(there, depth, 1.0), torch.where(there, alpha, 0.0)
 
@@ -152,5 +152,5 @@ def covering(rig: Rig, usable: Bool[Tensor, "V H W"]) -> Bool[Tensor, "V H W"]:
     Args:
         rig: with confidences. usable: where depths show something.
     """
-    through, between = seen_through(rig), outvoted(rig)
+    through, between = seen_through(rig), outvoted_pixels(rig)
     return fill_uncovered(rig, select_views(rig, usable & ~through & ~between), usable, between)

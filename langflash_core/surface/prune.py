@@ -17,7 +17,7 @@ from torch import Tensor
 from langflash_core.geometry.harmonics import SH_C0
 from langflash_core.rig.projected import project_points
 from langflash_core.scene.fields import stored_bytes
-from langflash_core.scene.weights import renormalised
+from langflash_core.scene.weights import renormalise
 from langflash_core.surface.settings import PRUNING
 from langflash_core.types import Gaussians, Scene, Semantics
 
@@ -54,7 +54,7 @@ def prune(
     bright = scene.rows(scene.gaussians.opacities >= PRUNING.cut)
     merged = bright
     if merge:
-        merged = _merged(bright, _parents(_sight(bright), bright, merge_radius, colour_tolerance))
+        merged = _merge_groups(bright, _parents(_sight(bright), bright, merge_radius, colour_tolerance))
     small = sparser(merged)
     report = {
         "gaussians_before": len(scene.gaussians),
@@ -132,7 +132,7 @@ def _nearest(
     inside = (column >= 0) & (column < width - 1) & (line >= 0) & (line < height - 1)
     rows, first = rows[inside], (line * width + column)[inside]
     around = torch.tensor([0, 1, width, width + 1], device=rows.device)
-    candidates = _picked(pixel_map.flatten(), first[:, None] + around)
+    candidates = _gather_rows(pixel_map.flatten(), first[:, None] + around)
     some = candidates.amax(-1) >= 0
     return rows[some], candidates[some]
 
@@ -142,9 +142,9 @@ def _pairs(
 ) -> tuple[Tensor, Tensor]:
     """Children (c,) and their parents (c,), no parent twice; colours are looked at where places agree."""
     there = candidates.clamp_min(0)
-    x, y, z = (_picked(along, there) - along.index_select(0, rows)[:, None] for along in sight.means)
+    x, y, z = (_gather_rows(along, there) - along.index_select(0, rows)[:, None] for along in sight.means)
     distances = (x * x + y * y + z * z).sqrt()
-    reach = radius * torch.minimum(_picked(sight.footprints, there), sight.footprints[rows, None])
+    reach = radius * torch.minimum(_gather_rows(sight.footprints, there), sight.footprints[rows, None])
     close = (candidates >= 0) & (distances < reach)
     some = close.any(-1)
     rows, there, close, distances = rows[some], there[some], close[some], distances[some]
@@ -159,7 +159,7 @@ def _pairs(
     return rows[matched[chosen]], found[chosen]
 
 
-def _picked(values: Tensor, ids: Tensor) -> Tensor:
+def _gather_rows(values: Tensor, ids: Tensor) -> Tensor:
     """`values[ids]` of ids (n, m), which `index_select` finds in a third of the time."""
     return values.index_select(0, ids.flatten()).unflatten(0, ids.shape)
 
@@ -174,7 +174,7 @@ def _first_of_each(keys: Tensor, costs: Tensor, num_keys: int) -> Tensor:
     return order[best[best < len(order)]]
 
 
-def _merged(scene: Scene, parents: Tensor) -> Scene:
+def _merge_groups(scene: Scene, parents: Tensor) -> Scene:
     """Every group becomes one Gaussian in its parent's row, of its level and its confidence.
 
     Places, colours, and weights are opacity-weighted means, the shape is the most opaque
@@ -230,13 +230,13 @@ def _blended_weights(members: Semantics, shares: Tensor, group: Tensor) -> tuple
         dense = values.new_zeros(count * num_atoms).index_add(0, flat.flatten(), values[here].flatten())
         parts.append(dense.view(count, num_atoms).topk(min(top_m, num_atoms), dim=-1))
     top_values = torch.cat([part.values for part in parts])
-    return torch.cat([part.indices for part in parts]), renormalised(top_values)
+    return torch.cat([part.indices for part in parts]), renormalise(top_values)
 
 
 def sparser(scene: Scene) -> Scene:
     """Weights below 1/255 become 0, empty columns and unused atoms go, ids are renumbered."""
     semantics, ids, values = scene.semantics, scene.semantics.weight_ids, scene.semantics.weight_values
-    values = renormalised(torch.where(values >= PRUNING.cut, values, 0.0))
+    values = renormalise(torch.where(values >= PRUNING.cut, values, 0.0))
     values, order = values.sort(dim=-1, descending=True, stable=True)
     ids = ids.gather(1, order)
     kept_columns = int((values > 0).any(0).sum())

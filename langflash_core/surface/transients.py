@@ -60,10 +60,10 @@ def transient_masks(rig: Rig) -> Bool[Tensor, "V H W"]:
             continue
         said = _Foreseen.together([other.foreseen(own) for other in others])
         faced = torch.stack([other.faces(own) for other in others])
-        contradicted, through = _contradicted(own, said, faced)
+        contradicted, through = _contradicted_cells(own, said, faced)
         seeds = [seed for seed in _seeds(contradicted) if not _elsewhere(seed, own, others, faced)]
         if seeds:
-            found[view] = _at_size(_grown(torch.stack(seeds).any(0), through | contradicted), found[view])
+            found[view] = _at_size(_grow_mask(torch.stack(seeds).any(0), through | contradicted), found[view])
     return found
 
 
@@ -169,7 +169,7 @@ class _Foreseen:
         return _Foreseen(*(torch.stack([getattr(one, name) for one in some]) for name in names))
 
 
-def _contradicted(own: _Look, said: _Foreseen, faced: Tensor) -> tuple[Tensor, Tensor]:
+def _contradicted_cells(own: _Look, said: _Foreseen, faced: Tensor) -> tuple[Tensor, Tensor]:
     """(h, w) bool: cells where others foresee another colour; and those that they see through. faced: (U, h,
     w) bool, where they look."""
     told = torch.isfinite(said.depth) & faced
@@ -221,7 +221,7 @@ def _elsewhere(seed: Tensor, own: _Look, others: list[_Look], faced: Tensor) -> 
     return showing >= (_VOTES if len(asked) > TRANSIENTS.few else 1)
 
 
-def _grown(seeds: Tensor, may: Tensor) -> Tensor:
+def _grow_mask(seeds: Tensor, may: Tensor) -> Tensor:
     """(h, w) bool: seeds, what goes on from there, holes and a margin."""
     import scipy.ndimage  # a tenth of what is imported for a scene, where few have transients
 

@@ -30,7 +30,7 @@ class Upsampled:
     slopes: Float[Tensor, "H W"]
 
 
-def upsampled(
+def upsample_depths(
     log_depths: Float[Tensor, "H W"], image: Float[Tensor, "3 H W"], photo: Float[Tensor, "3 h w"]
 ) -> Upsampled:
     """Log depths (H, W) at the size of the photo.
@@ -50,7 +50,7 @@ def upsampled(
     smooth += across[rows][:, columns] * _past(width, log_depths.shape[1])
     y, x = _broken(log_depths, (across.abs() + down.abs()) / inverse)[rows][:, columns].nonzero(as_tuple=True)
     if len(y):
-        chosen, values = _chosen(inverse, across, down, image, photo, (y, x), (rows[y], columns[x]))
+        chosen, values = _choose_cells(inverse, across, down, image, photo, (y, x), (rows[y], columns[x]))
         smooth[y, x], cells[y, x] = values, chosen
     return Upsampled(-smooth.clamp_min(1e-9).log(), cells, torch.hypot(*steps) / inverse)
 
@@ -87,7 +87,7 @@ def _broken(log_depths: Tensor, slope: Tensor) -> Tensor:
     return (span[0, 0] > UPSAMPLING.jump + 3 * slope) | (slope > UPSAMPLING.steep)
 
 
-def _chosen(
+def _choose_cells(
     inverse: Tensor,
     across: Tensor,
     down: Tensor,

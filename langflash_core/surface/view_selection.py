@@ -48,7 +48,7 @@ def select_views(rig: Rig, known: Bool[Tensor, "V H W"] | None = None) -> Bool[T
         finest, mine = torch.full_like(points[0], torch.inf), torch.zeros_like(points[0], dtype=torch.bool)
         others = order
         if len(rig) > _ALL:
-            tried = _tried(rig.size)
+            tried = _tried_cells(rig.size)
             others = _holders(view, points[:, tried], normals[:, tried], rig, takers, order, first)
         for other in others:
             area = _covered_area(points, normals, rig, other)
@@ -58,7 +58,7 @@ def select_views(rig: Rig, known: Bool[Tensor, "V H W"] | None = None) -> Bool[T
             finest = torch.where(takes, area, finest)
             mine = takes if other == view else mine & ~takes
         keep[view] = mine.view_as(keep[view])
-    return fill_uncovered(rig, _closed(keep) & known, known)
+    return fill_uncovered(rig, _close_mask(keep) & known, known)
 
 
 def _takers(known: Tensor, first: list[int]) -> Tensor:
@@ -162,7 +162,7 @@ def _block_by_block(height: int, width: int) -> Tensor:
     return block.flatten().argsort(stable=True)
 
 
-def _tried(size: tuple[int, int]) -> Tensor:
+def _tried_cells(size: tuple[int, int]) -> Tensor:
     """Numbers (n,) of the cells of a grid that are tried."""
     cells = torch.arange(size[0] * size[1]).view(size[0], size[1])
     first = [min(_TRIED // 2, side - 1) for side in size]
@@ -221,7 +221,7 @@ def _same(points: Tensor, rig: Rig, views: int | slice, known: Tensor) -> Tensor
     return there.inside & there.looked_up(known.flatten(-2)) & near
 
 
-def _closed(keep: Tensor) -> Tensor:
+def _close_mask(keep: Tensor) -> Tensor:
     """Crumbs go, and what stays goes on by a cell on all sides, so that no seam opens."""
     some = F.avg_pool2d(keep[:, None].float(), 3, 1, 1, count_include_pad=False) > 0.5
     return F.max_pool2d(some.float(), 3, 1, 1)[:, 0] > 0

@@ -10,21 +10,21 @@ from pathlib import Path
 
 from langflash_core.base.files import check_folder, check_output_file, check_same_kind
 from langflash_core.base.formats import kind_of
-from langflash_core.base.outputs import ALL_OUT, PLY, SCENE, Output, loaded
+from langflash_core.base.outputs import ALL_OUT, PLY, SCENE, Output, import_reference
 from langflash_core.base.records import told_shift
 from langflash_core.base.request import ExportRequest
 from langflash_core.base.running import Progress
-from langflash_core.export import opened
+from langflash_core.export import open_scene
 from langflash_core.types import Scene
 from langflash_core.writing.cameras import CameraChoice, chosen_camera
 from langflash_core.writing.films import check_encoder
 from langflash_core.writing.job import Job, no_progress
 from langflash_core.writing.renderers import Renderer, torch_renderer
 
-__all__ = ["Job", "Renderer", "prepared", "request_of_whole", "write"]
+__all__ = ["Job", "Renderer", "prepare_output", "request_of_whole", "write"]
 
 
-def prepared(request: ExportRequest) -> tuple[Output, CameraChoice]:
+def prepare_output(request: ExportRequest) -> tuple[Output, CameraChoice]:
     """What is written and from where it is seen, checked as far as it can be without the scene.
 
     Raises:
@@ -64,13 +64,13 @@ def write(
     Raises:
         LangFlashError: the request cannot be fulfilled, or nothing answers.
     """
-    kind, choice = prepared(request)
-    scene = opened(scene)
-    said = loaded(kind.writer)(Job(request, kind, scene, choice, renderers, progress))
-    return said + _unshifted(scene, request, kind)
+    kind, choice = prepare_output(request)
+    scene = open_scene(scene)
+    said = import_reference(kind.writer)(Job(request, kind, scene, choice, renderers, progress))
+    return said + _shift_note(scene, request, kind)
 
 
-def _unshifted(scene: Scene, request: ExportRequest, kind: Output) -> str:
+def _shift_note(scene: Scene, request: ExportRequest, kind: Output) -> str:
     """That a file's coordinates are the scene's, not those of the file far from 0 that it came from."""
     places = kind.subject in ("scene", "photos") or kind.word in ("boxes", "surface")
     kept = kind in (PLY, SCENE) and not request.upright

@@ -50,7 +50,7 @@ class CameraChoice:
             ViewError: the scene has no such view.
         """
         if self.described is not None:
-            camera = self.described if self.size is None else self.described.resized(*self.size)
+            camera = self.described if self.size is None else self.described.with_size(*self.size)
             return lit_camera(scene, self._by_rays(camera, scene))
         return self.of_photo(scene, self.view or 0)
 

@@ -66,17 +66,17 @@ def relevance(look: Look) -> Painted:
     result = look.answer()
     threshold = result.answers[0].threshold
     lit = heat_over(result.relevance[0], result.frame.rgb, threshold, result.mode, look.colours)
-    return to_8bit(lit), {"prompts": _told(result)}
+    return to_8bit(lit), {"prompts": _answer_records(result)}
 
 
 def labels(look: Look) -> Painted:
     """Each pixel in the colour of the phrase that fits best."""
     result = look.answer()
-    entries = _told(result)
+    entries = _answer_records(result)
     for entry, colour in zip(entries, label_colours(len(entries)), strict=True):
         entry["colour"] = "#" + bytes(colour).hex()
     return label_picture(result), {"prompts": entries}
 
 
-def _told(result: QueryResult) -> list[dict[str, Any]]:
+def _answer_records(result: QueryResult) -> list[dict[str, Any]]:
     return [{"prompt": each.prompt, "found": each.found, "score": each.score} for each in result.answers]

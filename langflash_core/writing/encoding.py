@@ -27,7 +27,7 @@ _WEBP = (
 
 
 @contextmanager
-def encoded(path: Path, size: tuple[int, int]) -> Iterator[Callable[[bytes], object]]:
+def open_encoder(path: Path, size: tuple[int, int]) -> Iterator[Callable[[bytes], object]]:
     """A function that takes pictures, (H, W, 3) bytes each, one after the other; the film is whole where the
     block ends well. H.264, or for a .webp an animation that begins again at its end.
 
@@ -39,7 +39,7 @@ def encoded(path: Path, size: tuple[int, int]) -> Iterator[Callable[[bytes], obj
         LangFlashError: it cannot be started.
     """
     with tempfile.TemporaryFile() as complaints:
-        encoder = _started(path, size, complaints)
+        encoder = _start_ffmpeg(path, size, complaints)
         assert encoder.stdin is not None
         try:
             with suppress(BrokenPipeError):  # it is gone, and has said why
@@ -58,7 +58,7 @@ def encoded(path: Path, size: tuple[int, int]) -> Iterator[Callable[[bytes], obj
             )
 
 
-def _started(path: Path, size: tuple[int, int], complaints) -> subprocess.Popen:
+def _start_ffmpeg(path: Path, size: tuple[int, int], complaints) -> subprocess.Popen:
     import imageio_ffmpeg
 
     codec = _WEBP if path.suffix.lower() == ".webp" else _H264

@@ -42,7 +42,7 @@ from langflash_core.scene.tour import read_tour
 from langflash_core.scene.world import turn_of
 from langflash_core.types import NO_LANGUAGE, Camera, Scene
 from langflash_core.writing.cameras import camera_of
-from langflash_core.writing.encoding import encoded
+from langflash_core.writing.encoding import open_encoder
 from langflash_core.writing.job import Job
 from langflash_core.writing.renderers import Renderer
 from langflash_core.writing.settings import FILMING
@@ -70,7 +70,7 @@ def write_film(job: Job) -> str:
     request, scene = job.request, job.scene
     shown, heat = scene, None
     if job.kind.colours:
-        heat = asked(scene, job.prompts[0], request.threshold)
+        heat = compile_phrase(scene, job.prompts[0], request.threshold)
     elif job.prompts:
         shown = pipeline.select(scene, job.prompts, threshold=request.threshold)
     cameras = way(request.path, scene, shown, request.size, request.seconds)
@@ -79,7 +79,7 @@ def write_film(job: Job) -> str:
     return f"{len(cameras) / RATE:.1f} s, {cameras[0].width} x {cameras[0].height}"
 
 
-def asked(scene: Scene, phrase: str, threshold: float | None) -> CompiledQuery:
+def compile_phrase(scene: Scene, phrase: str, threshold: float | None) -> CompiledQuery:
     """What a heat-map is of: the head of a phrase (`language/grammar.py`).
 
     Raises:
@@ -159,7 +159,7 @@ def write(
         LangFlashError: the disk is full, or the encoder stopped otherwise.
     """
     size = (cameras[0].width, cameras[0].height)
-    with encoded(path, size) as add:
+    with open_encoder(path, size) as add:
         for index, camera in enumerate(cameras):
             progress("drawing", index / len(cameras))
             add(picture(scene, camera, renderer, heat, colours).tobytes())

@@ -10,7 +10,7 @@ from langflash_core.export.paint import write_picture
 from langflash_core.export.png import write_grey, write_labels
 from langflash_core.types import SegmentedView
 from langflash_core.writing.job import Job
-from langflash_core.writing.subject import Subject, counted, cut_out, surfaces, taken_apart, views_of
+from langflash_core.writing.subject import Subject, cut_out, plural, surfaces, taken_apart, views_of
 
 
 def write_parts(job: Job) -> str:
@@ -34,7 +34,7 @@ def write_parts(job: Job) -> str:
                 where = "this view" if len(cameras) == 1 else "any view"
                 raise PromptError(f"not found in {where}: {', '.join(job.prompts)}; choose another --view")
     size = f"{cameras[0].width} x {cameras[0].height}"
-    return f"{size}, {counted(len(subject.things), 'instance')} of {counted(len(subject.found), 'phrase')}"
+    return f"{size}, {plural(len(subject.things), 'instance')} of {plural(len(subject.found), 'phrase')}"
 
 
 def _write_part(kind: Output, path: Path, subject: Subject, view: SegmentedView) -> None:
@@ -60,4 +60,4 @@ def write_surface(job: Job) -> str:
     make_folder(output.parent)
     glb.write_surfaces(meshes, output, subject.metres or 1.0)
     faces = sum(len(mesh.faces) for _, mesh in meshes)
-    return f"{counted(len(meshes), 'surface')}, {faces:,} triangles"
+    return f"{plural(len(meshes), 'surface')}, {faces:,} triangles"

@@ -50,7 +50,7 @@ class TorchRenderer:
         from langflash_core.export.png import to_8bit
 
         frame = self(scene, camera, weight_maps=False)
-        return to_8bit(_shown(frame, scene, camera, fade=fade, fill=fill).rgb)
+        return to_8bit(_show_frame(frame, scene, camera, fade=fade, fill=fill).rgb)
 
     def answered(self, scene: Scene, camera: Camera, compiled: "CompiledQuery") -> "tuple[Frame, Tensor]":
         from langflash_core.language.relevance import relevance_maps
@@ -70,7 +70,7 @@ class Shown:
 
     def __call__(self, scene: Scene, camera: Camera, *, weight_maps: bool = True) -> Frame:
         frame = self.inner(scene, camera, weight_maps=weight_maps)
-        return _shown(frame, scene, camera, fade=self._fade, fill=self._fill)
+        return _show_frame(frame, scene, camera, fade=self._fade, fill=self._fill)
 
     def colours(
         self, scene: Scene, camera: Camera, *, fade: bool = False, fill: bool = False
@@ -79,16 +79,16 @@ class Shown:
 
     def answered(self, scene: Scene, camera: Camera, compiled: "CompiledQuery") -> "tuple[Frame, Tensor]":
         frame, relevance = self.inner.answered(scene, camera, compiled)
-        shown = _shown(frame, scene, camera, fade=self._fade, fill=self._fill)
+        shown = _show_frame(frame, scene, camera, fade=self._fade, fill=self._fill)
         return shown, relevance * (shown.alphas > 0) if self._fade else relevance
 
 
-def _shown(frame: Frame, scene: Scene, camera: Camera, *, fade: bool, fill: bool) -> Frame:
-    from langflash_core.scene.gaps import filled
-    from langflash_core.scene.trust import faded
+def _show_frame(frame: Frame, scene: Scene, camera: Camera, *, fade: bool, fill: bool) -> Frame:
+    from langflash_core.scene.gaps import fill_gaps
+    from langflash_core.scene.trust import fade_untrusted
 
-    shown = faded(frame, camera, scene) if fade else frame
-    return replace(shown, rgb=filled(shown.rgb, frame.alphas)) if fill else shown
+    shown = fade_untrusted(frame, camera, scene) if fade else frame
+    return replace(shown, rgb=fill_gaps(shown.rgb, frame.alphas)) if fill else shown
 
 
 @contextmanager

@@ -6,7 +6,7 @@ from pathlib import Path
 import torch
 
 from langflash_core.__main__ import in_program
-from langflash_core.export import opened
+from langflash_core.export import open_scene
 from langflash_core.pipeline import seen_from
 from langflash_core.types import Camera, Frame, Scene
 from langflash_core.writing.cameras import kept_size
@@ -33,7 +33,7 @@ def render(
         ViewError: there is no such view, or the size cannot be drawn.
         SceneFileError: the path holds no scene. InputError: neither a scene nor a path was given.
     """
-    scene = opened(scene)
+    scene = open_scene(scene)
     if camera is None and size is None and 0 <= view < scene.num_views:
         size = kept_size(scene, view)
     chosen = seen_from(scene, view, camera, size)

@@ -7,14 +7,14 @@ from torch import Tensor
 from langflash_core import pipeline
 from langflash_core.base.files import make_folder
 from langflash_core.base.formats import SOG_FOLDER, kind_of
-from langflash_core.base.outputs import GLB, OPEN_USD, PLY, SCENE, SPLAT, loaded
+from langflash_core.base.outputs import GLB, OPEN_USD, PLY, SCENE, SPLAT, import_reference
 from langflash_core.errors import InputError
 from langflash_core.export import read
 from langflash_core.export.language import side_car
 from langflash_core.export.sog import sog_files
 from langflash_core.level import upright
 from langflash_core.scene.thin import coarse_level
-from langflash_core.surface.fused import fused
+from langflash_core.surface.fused import fuse_layers
 from langflash_core.types import Scene
 from langflash_core.writing.job import Job
 
@@ -28,19 +28,21 @@ def write_scene(job: Job) -> str:
     scene, path = job.scene, job.request.output
     chosen = _as_fine(job)
     if job.kind is not SCENE and job.kind.subject != "photos":
-        chosen = fused(chosen)
+        chosen = fuse_layers(chosen)
     if job.prompts:
         chosen = pipeline.select(chosen, job.prompts, threshold=job.request.threshold)
     chosen = upright(chosen) if job.request.upright else chosen
     make_folder(path.parent)
     axes = job.request.axes_of(path)
-    loaded(job.kind.of_scene)(chosen, path, **({"axes": axes} if axes else {}))
+    import_reference(job.kind.of_scene)(chosen, path, **({"axes": axes} if axes else {}))
     if job.kind.subject == "photos":
         return f"{scene.num_views} photos in images/ and their poses"
     fewer = len(chosen.gaussians) < len(scene.gaussians)
     share = f" of {len(scene.gaussians):,}" if fewer or job.prompts else ""
     has_side_car = job.kind is PLY and chosen.semantics.num_atoms > 0
-    marked = f"; a {kind_of(path)} cannot say that they are to be smoothed" if _unmarked(job, chosen) else ""
+    marked = (
+        f"; a {kind_of(path)} cannot say that they are to be smoothed" if _is_unmarked(job, chosen) else ""
+    )
     beside = f", its language in {side_car(path).name}" if has_side_car else ""
     return f"{len(chosen.gaussians):,}{share} Gaussians, {_megabytes(path):.1f} MB{beside}{marked}"
 
@@ -108,7 +110,7 @@ def _as_fine(job: Job, scene: Scene | None = None) -> Scene:
     return coarse_level(scene) if job.request.detail == "low" else scene
 
 
-def _unmarked(job: Job, scene: Scene) -> bool:
+def _is_unmarked(job: Job, scene: Scene) -> bool:
     return scene.record.antialiased and job.kind in (SPLAT, GLB, OPEN_USD)
 
 

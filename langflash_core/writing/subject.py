@@ -130,6 +130,6 @@ def surfaces(subject: Subject) -> list[tuple[str, Surface]]:
     return [(name, mesh) for name, mesh in meshes if mesh is not None]
 
 
-def counted(number: int, what: str) -> str:
+def plural(number: int, what: str) -> str:
     """`1 view`, `2 views`."""
     return f"{number} {what}{'s' * (number != 1)}"

@@ -36,7 +36,7 @@ def write_pictures(job: Job) -> str:
                 job.progress("drawing", index / len(cameras))
                 frame = renderer(job.scene, camera, weight_maps=False)
                 write_picture(staging / target.name, to_8bit(frame.rgb))
-    return _told(job, cameras, targets, answers)
+    return _describe_views(job, cameras, targets, answers)
 
 
 def _write_answered(job: Job, path: Path, result: QueryResult) -> None:
@@ -51,7 +51,9 @@ def _write_answered(job: Job, path: Path, result: QueryResult) -> None:
         write_picture(path, to_8bit(lit))
 
 
-def _told(job: Job, cameras: Sequence[Camera], targets: Sequence[Path], answers: Sequence[Answers]) -> str:
+def _describe_views(
+    job: Job, cameras: Sequence[Camera], targets: Sequence[Path], answers: Sequence[Answers]
+) -> str:
     size = f"{cameras[0].width} x {cameras[0].height}"
     if job.request.all_views:
         size += f", {', '.join(target.name for target in targets)}"

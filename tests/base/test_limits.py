@@ -94,7 +94,7 @@ def test_texts(monkeypatch, tmp_path):
 
     other_files(tmp_path)
     scene = stripes()
-    marks = Marks.untouched(len(scene.gaussians), scene.semantics.num_atoms)
+    marks = Marks.without_edits(len(scene.gaussians), scene.semantics.num_atoms)
     save_history(History(marks), scene, {"name": "made"}, tmp_path / "b.edits")
     for name, does in (
         ("transforms.json", lambda: read_posed(tmp_path / "transforms.json")),

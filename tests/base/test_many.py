@@ -6,7 +6,7 @@ import torch
 from torch.nn import functional as F
 
 from langflash_core.base import many
-from langflash_core.base.many import FEW, groups_of, held, in_groups, together
+from langflash_core.base.many import FEW, groups_of, in_groups, in_half_precision, together
 from langflash_core.cameras import structure as cameras
 from langflash_core.cameras.retrieval import likeness
 from langflash_core.network import GuidedDepthNet, guided, load_network
@@ -16,7 +16,7 @@ from langflash_core.network.layers.decoder import TwoStackDecoder
 from langflash_core.network.presets import MINI
 from langflash_core.network.semantics.aggregation import average_atoms
 from langflash_core.network.semantics.grouping import SemanticGrouping, surviving, surviving_of
-from langflash_core.network.semantics.splitting import condensed
+from langflash_core.network.semantics.splitting import condense_features
 from langflash_core.rig.pairs import best
 from langflash_core.rig.rig import DepthMaps
 
@@ -75,8 +75,8 @@ def test_in_groups_is_the_whole(count: int, dim: int):
 
 def test_few_stay_as_they_are():
     part = torch.rand(FEW, 2)
-    assert together([part], FEW) is part and held(part, FEW) is part
-    assert held(part, FEW + 1).dtype == torch.float16
+    assert together([part], FEW) is part and in_half_precision(part, FEW) is part
+    assert in_half_precision(part, FEW + 1).dtype == torch.float16
 
 
 def test_attention_to_a_memory_in_parts_equals_that_to_all_of_it():
@@ -211,7 +211,7 @@ def test_means_over_many_photos_are_those_over_all_at_once():
 def test_few_directions_of_many_photos_keep_cosines():
     torch.manual_seed(0)
     features = (torch.randn(VIEWS * 30, 20) @ torch.randn(20, 64)).view(VIEWS, 5, 6, 64).movedim(-1, 1)
-    small = condensed(features.half())
+    small = condense_features(features.half())
     assert small.shape == (VIEWS, 32, 5, 6) and small.dtype == torch.float32
     full, few = (F.normalize(maps.movedim(1, -1).flatten(0, 2), dim=1) for maps in (features, small))
     assert torch.allclose(full @ full.T, few @ few.T, atol=5 * HALF)

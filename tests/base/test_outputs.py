@@ -24,7 +24,7 @@ from langflash_core.base.outputs import (
     WORDS,
     Output,
     help_of_files,
-    loaded,
+    import_reference,
     output_of,
 )
 from langflash_core.base.request import ExportRequest
@@ -36,10 +36,10 @@ GUIDE = (Path(__file__).parents[2] / "GUIDE.md").read_text("utf-8")
 @pytest.mark.parametrize("output", OUTPUTS, ids=lambda output: output.name)
 def test_every_writer_is_there_and_takes_what_it_gets(output: Output) -> None:
     plain = [output.of_scene, output.of_frame, output.of_answer]
-    assert list(inspect.signature(loaded(output.writer)).parameters) == ["job"]
+    assert list(inspect.signature(import_reference(output.writer)).parameters) == ["job"]
     assert output.of_scene or output.writer != Output("", ("",)).writer, "nobody writes it"
     for reference in filter(None, plain):
-        _, second, *rest = inspect.signature(loaded(reference)).parameters.values()
+        _, second, *rest = inspect.signature(import_reference(reference)).parameters.values()
         assert second.name == "path" and all(p.default is not p.empty for p in rest), reference
 
 
@@ -50,7 +50,7 @@ def test_names_are_of_one_kind_each_and_words_never_of_two_for_an_ending() -> No
     for output in OFFERED:
         assert output.label and output.tip and kind_of(Path(f"x{output.suffix}")) == output.suffix
     assert set(READERS) >= {".ksplat", ".gltf"}
-    assert all(callable(loaded(reader)) for reader in READERS.values())
+    assert all(callable(import_reference(reader)) for reader in READERS.values())
 
 
 def test_an_ending_stands_for_one_thing_unless_what_is_said() -> None:

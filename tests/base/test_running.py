@@ -2,7 +2,7 @@
 
 import pytest
 
-from langflash_core.base.running import Run, evenly, left
+from langflash_core.base.running import Run, evenly, time_left
 from langflash_core.errors import Cancelled
 
 BEGINS = {"read": 0.0, "think": 0.2, "write": 0.8, "check": 0.8}
@@ -65,8 +65,8 @@ def test_items_are_told_with_their_number_and_stop_the_run():
 
 
 def test_what_is_left_is_told_once_it_can_be():
-    assert left(1.0, 0.5) == left(60.0, 0.01) == left(60.0, 0.0) == left(60.0, 1.0) == ""
-    assert left(30.0, 0.75) == "about 10 s left" and left(300.0, 0.5) == "about 5 min left"
+    assert time_left(1.0, 0.5) == time_left(60.0, 0.01) == time_left(60.0, 0.0) == time_left(60.0, 1.0) == ""
+    assert time_left(30.0, 0.75) == "about 10 s left" and time_left(300.0, 0.5) == "about 5 min left"
 
 
 def test_steps_are_made_where_nothing_is_kept():

@@ -13,7 +13,7 @@ from langflash_core.cameras.bundle import Bundle, Optics, adjusted_bundle
 from langflash_core.cameras.inputs import PoseInput
 from langflash_core.cameras.keypoints import KeyPoints
 from langflash_core.cameras.poses import Poses, estimate_poses, on_other_maps
-from langflash_core.cameras.tracks import Tracks, joined, with_pairs
+from langflash_core.cameras.tracks import Tracks, join_matches, with_pairs
 from langflash_core.rig.settings import BUNDLE, MATCHING
 
 SIZE, FOCAL = (224, 168), 200.0  # 58.5 degrees
@@ -96,7 +96,7 @@ def test_matches_become_tracks_and_those_that_contradict_themselves_go():
         (1, 2): np.array([[0, 0], [1, 1]]),
         (0, 2): np.array([[2, 1]]),  # the second point twice in view 0
     }
-    tracks = joined(positions, pairs, [0.5, 0.5, 0.7])
+    tracks = join_matches(positions, pairs, [0.5, 0.5, 0.7])
     assert tracks.points.tolist() == [0, 0, 0] and tracks.views.tolist() == [0, 1, 2]
     assert tracks.pixels.tolist() == [[1, 1], [4, 4], [6, 6]] and tracks.sigmas.tolist() == [0.5, 0.5, 0.7]
     more = with_pairs(tracks, [(0, 2, np.ones((2, 2)), np.zeros((2, 2)), 3.0)])
@@ -105,12 +105,12 @@ def test_matches_become_tracks_and_those_that_contradict_themselves_go():
     assert (
         fewer.points.tolist() == [0, 0, 1, 1] and rows.tolist() == [3, 4, 5, 6] and points.tolist() == [1, 2]
     )
-    assert len(joined([np.zeros((0, 2))] * 2, {(0, 1): np.zeros((0, 2), int)}, [1.0, 1.0])) == 0
+    assert len(join_matches([np.zeros((0, 2))] * 2, {(0, 1): np.zeros((0, 2), int)}, [1.0, 1.0])) == 0
 
 
 def test_key_points_of_one_place_are_one():
     positions = [np.array([[1.0, 1], [1, 1]]), np.array([[4.0, 4]]), np.array([[6.0, 6]])]
-    tracks = joined(positions, {(0, 1): np.array([[0, 0]]), (0, 2): np.array([[1, 0]])}, [1.0] * 3)
+    tracks = join_matches(positions, {(0, 1): np.array([[0, 0]]), (0, 2): np.array([[1, 0]])}, [1.0] * 3)
     assert tracks.views.tolist() == [0, 1, 2] and tracks.num_points == 1
 
 
@@ -348,10 +348,10 @@ def test_points_that_very_many_photos_saw_are_known_from_some_of_them():
     given = module.Tracks(
         points, views, np.random.default_rng(0).random((len(views), 2)), np.ones(len(views))
     )
-    kept = module._spread(given)
+    kept = module._spread_observations(given)
     for point, length in enumerate(lengths):
         own = views[(points == point) & kept]
         assert len(own) == min(length, BUNDLE.longest) and own[0] == 0 and own[-1] == length - 1
         assert max(np.diff(own)) - min(np.diff(own)) <= 1
     few = given.subset(points < 2)[0]
-    assert module._spread(few).all()
+    assert module._spread_observations(few).all()

@@ -10,11 +10,11 @@ from scipy.spatial.transform import Rotation
 from langflash_core.cameras import graph
 from langflash_core.cameras.graph import (
     Placed,
-    adjusted,
-    chained,
-    confirmed,
+    adjust_poses,
+    chain_poses,
+    count_confirmations,
     gap,
-    placed,
+    place_views,
 )
 from langflash_core.cameras.matching import RelativePose
 from langflash_core.rig.settings import GRAPH
@@ -58,7 +58,7 @@ def _turned(found: np.ndarray, true: np.ndarray) -> np.ndarray:
 
 def test_exact_edges_give_the_exact_places():
     viewmats, logs, pairs = _walk(0, noise=0.0)
-    found = placed(6, pairs)
+    found = place_views(6, pairs)
     np.testing.assert_allclose(found.viewmats, viewmats, atol=1e-9)
     np.testing.assert_allclose(np.log(found.scales), logs, atol=1e-9)
     assert found.kept == tuple(pairs) and found.missing == ()
@@ -85,8 +85,8 @@ def test_errors_do_not_grow_along_the_tree_as_they_did():
     errors = []
     for seed in range(8):
         viewmats, _, pairs = _walk(seed, num_views=8, reach=4)
-        tree = chained(8, pairs, confirmed(pairs))
-        errors.append([_turned(p.viewmats, viewmats)[-1] for p in (tree, adjusted(tree, pairs))])
+        tree = chain_poses(8, pairs, count_confirmations(pairs))
+        errors.append([_turned(p.viewmats, viewmats)[-1] for p in (tree, adjust_poses(tree, pairs))])
     before, after = np.mean(errors, 0)
     assert after < 0.8 * before  # some 22 edges instead of 7 know of 7 places: sqrt(7 / 22) is .56
 
@@ -94,7 +94,7 @@ def test_errors_do_not_grow_along_the_tree_as_they_did():
 def test_a_wrong_edge_is_outvoted_and_not_kept():
     viewmats, _, pairs = _walk(1, reach=3, noise=0.002)
     pairs[0, 2] = _edge(_matrix([0.6, -0.4, 0.2], [1.0, -1.0, 0.3]), 0.5, count=150)  # the strongest of all
-    found = placed(6, pairs)
+    found = place_views(6, pairs)
     assert _turned(found.viewmats, viewmats).max() < 0.5  # noise of .1 degree an edge
     assert (0, 2) not in found.kept and len(found.kept) == len(pairs) - 1
 
@@ -106,9 +106,9 @@ def test_triangles_that_close_confirm_their_edges():
         (1, 2): _edge(step, count=30),
         (0, 2): _edge(step @ step, count=20),
     }
-    assert confirmed(pairs) == {(0, 1): 60, (1, 2): 50, (0, 2): 40}
+    assert count_confirmations(pairs) == {(0, 1): 60, (1, 2): 50, (0, 2): 40}
     pairs[0, 2] = _edge(step, count=20)  # turns by 11 degrees too little
-    assert confirmed(pairs) == {(0, 1): 40, (1, 2): 30, (0, 2): 20}
+    assert count_confirmations(pairs) == {(0, 1): 40, (1, 2): 30, (0, 2): 20}
 
 
 def test_jacobians_equal_finite_differences():
@@ -119,27 +119,27 @@ def test_jacobians_equal_finite_differences():
         for column in range(7):
             step = np.zeros((6, 7))
             step[view, column] = 1e-3  # OpenCV takes turns below 1e-5 for none
-            ahead = gap(*graph._moved(viewmats, logs, step), edge, pairs[edge])
-            back = gap(*graph._moved(viewmats, logs, -step), edge, pairs[edge])
+            ahead = gap(*graph._apply_step(viewmats, logs, step), edge, pairs[edge])
+            back = gap(*graph._apply_step(viewmats, logs, -step), edge, pairs[edge])
             assert (ahead - back) / 2e-3 == pytest.approx(jacobian[:, column], abs=1e-5)  # third order: 1e-6
 
 
 def test_the_adjustment_reaches_the_optimum_of_scipy():
     _, _, pairs = _walk(3, num_views=4, noise=0.005, reach=3)
-    start = chained(4, pairs, confirmed(pairs))
+    start = chain_poses(4, pairs, count_confirmations(pairs))
     precisions = {edge: graph._precision(pose) for edge, pose in pairs.items()}
     logs = np.log(start.scales)
 
     def cost(x: np.ndarray) -> float:
         step = np.vstack((np.zeros(7), x.reshape(3, 7)))
-        return graph._cost(*graph._moved(start.viewmats, logs, step), pairs, precisions)
+        return graph._cost(*graph._apply_step(start.viewmats, logs, step), pairs, precisions)
 
-    own = adjusted(start, pairs)
+    own = adjust_poses(start, pairs)
     twin = minimize(cost, np.zeros(21), method="BFGS", options={"gtol": 1e-6})
     reached = graph._cost(own.viewmats, np.log(own.scales), pairs, precisions)
     # The last step was worth less than a millionth, and a step more a share of that.
     assert reached == pytest.approx(twin.fun, rel=1e-4)
-    best, _ = graph._moved(start.viewmats, logs, np.vstack((np.zeros(7), twin.x.reshape(3, 7))))
+    best, _ = graph._apply_step(start.viewmats, logs, np.vstack((np.zeros(7), twin.x.reshape(3, 7))))
     assert _turned(own.viewmats, best).max() < 0.01
 
 
@@ -149,7 +149,7 @@ def test_views_chain_through_the_best_connected_tree():
     back = _edge(_matrix([0, 0, 0], [1.0, 0, 0]), np.log(0.5), 80)
     wrong = _edge(_matrix([0, 0, 0], [9.0, 9, 9]), 0.0, 20)
     pairs = {(0, 2): step, (1, 2): back, (0, 1): wrong}
-    found = chained(4, pairs, {edge: pose.num_inliers for edge, pose in pairs.items()})
+    found = chain_poses(4, pairs, {edge: pose.num_inliers for edge, pose in pairs.items()})
     assert found.scales == pytest.approx([1, 4, 2, 1])
     assert found.viewmats[2, :3, 3] == pytest.approx([0, 0, 1])
     assert found.viewmats[1, :3, 3] == pytest.approx([-4, 0, 1])  # -1 in view 1's unit, which is 4
@@ -157,14 +157,14 @@ def test_views_chain_through_the_best_connected_tree():
 
 
 def test_nothing_and_one_edge_come_back_as_they_are():
-    alone = placed(3, {})
+    alone = place_views(3, {})
     assert alone.missing == (1, 2) and alone.kept == ()
     assert np.array_equal(alone.viewmats, np.repeat(np.eye(4)[None], 3, 0))
     step = _matrix([0.1, 0, 0], [0.2, 0, 0])
-    two = placed(2, {(0, 1): _edge(step)})
+    two = place_views(2, {(0, 1): _edge(step)})
     assert two.kept == ((0, 1),)
     np.testing.assert_allclose(
         two.viewmats[1], step, rtol=0, atol=1e-15
     )  # float64 products with the identity
-    same = placed(3, {(0, 1): _edge(np.eye(4)), (1, 2): _edge(np.eye(4)), (0, 2): _edge(np.eye(4))})
+    same = place_views(3, {(0, 1): _edge(np.eye(4)), (1, 2): _edge(np.eye(4)), (0, 2): _edge(np.eye(4))})
     assert isinstance(same, Placed) and np.isfinite(same.viewmats).all()  # one photo three times

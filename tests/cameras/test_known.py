@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from langflash_core.cameras.keypoints import KeyPoints
-from langflash_core.cameras.known import agreeing, depth_scales, doubt, explained, log_scales
+from langflash_core.cameras.known import agreeing, count_explained, depth_scales, doubt, log_scales
 from langflash_core.cameras.matching import Matches
 from langflash_core.cameras.poses import PoseInput, estimate_poses
 from langflash_core.errors import InputError
@@ -60,18 +60,18 @@ def test_poses_that_do_not_move_say_nothing_of_depth():
 def test_right_poses_explain_their_matches_and_others_do_not():
     """Also where a camera only turned, and where poses are off by what a headset's are."""
     matches, relative, _, _ = pair()
-    assert explained(matches, relative) == 60
+    assert count_explained(matches, relative) == 60
     turned = np.eye(4)
     turned[:3, :3] = cv2.Rodrigues(np.array([0, 4 * SIGMA, 0]))[0]  # radians: within 6 standard deviations
-    assert explained(matches, turned @ relative) == 60
+    assert count_explained(matches, turned @ relative) == 60
     still = relative.copy()
     still[:3, 3] = 0
     far = np.c_[matches.x_i, np.ones(60)] @ relative[:3, :3].T
     only_turned = Matches(matches.x_i, far[:, :2] / far[:, 2:], SIGMA)
-    assert explained(only_turned, still) == 60
+    assert count_explained(only_turned, still) == 60
     for wrong in (np.eye(4), still, np.linalg.inv(relative), np.diag([-1.0, -1, 1, 1]) @ relative):
-        assert explained(matches, wrong) < 10
-    assert explained(only_turned, np.eye(4)) < 10
+        assert count_explained(matches, wrong) < 10
+    assert count_explained(only_turned, np.eye(4)) < 10
 
 
 def test_poses_are_doubted_where_half_of_the_matches_do_not_fit():

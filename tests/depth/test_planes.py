@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 import torch
 
-from langflash_core.depth.planes import fitted_planes, flattened
+from langflash_core.depth.planes import fitted_planes, flatten_ripples
 from langflash_core.geometry.cameras import rays
 from langflash_core.rig.settings import FLATTENING
 
@@ -33,7 +33,7 @@ def _errors(of: float) -> torch.Tensor:
 @pytest.mark.parametrize("tilt", [0.0, 0.5, -1.0])
 def test_ripples_of_a_slanted_wall_go(tilt):
     wall = _wall(tilt)
-    flat = flattened(_rippled(wall, 0.01), _errors(0.08))
+    flat = flatten_ripples(_rippled(wall, 0.01), _errors(0.08))
     inner = (slice(None), slice(14, -14), slice(14, -14))  # at the border a window may hold half a wave
     assert (flat - wall)[inner].abs().mean() < 0.3 * 0.01 * (2 / math.pi) ** 2  # of a sine's mean
 
@@ -41,20 +41,20 @@ def test_ripples_of_a_slanted_wall_go(tilt):
 def test_a_plane_stays_to_the_last_digit():
     """Plane in inverse depth, so fits are exact; sums of float64 and two bilinear steps are left."""
     wall = _wall()
-    assert (flattened(wall, _errors(0.08)) - wall).abs().max() < 1e-9
+    assert (flatten_ripples(wall, _errors(0.08)) - wall).abs().max() < 1e-9
 
 
 def test_what_is_more_than_a_ripple_stays():
     """An edge, a thing on the wall, and waves where the map is sure of itself."""
     edge = _wall(0.0)
     edge[:, :, 56:] += 0.3
-    assert (flattened(edge, _errors(0.08)) - edge).abs().max() < 1e-6
+    assert (flatten_ripples(edge, _errors(0.08)) - edge).abs().max() < 1e-6
     thing = _wall(0.0)
     thing[:, 30:50, 40:64] -= 0.1  # 20 cm before a wall at 2 m
-    kept = flattened(thing, _errors(0.08))
+    kept = flatten_ripples(thing, _errors(0.08))
     assert (kept - thing).abs().max() < 0.01
     waves = _rippled(_wall(), 0.03)
-    changed = (flattened(waves, _errors(0.01)) - waves).abs()
+    changed = (flatten_ripples(waves, _errors(0.01)) - waves).abs()
     # At the border a window may hold half a wave, which is a slope: at most 2.5 of its ripples of .004.
     assert changed[:, 14:-14, 14:-14].max() < 1e-3 and changed.max() < 0.01
 
@@ -63,7 +63,7 @@ def test_a_corner_of_two_walls_keeps_its_depth():
     """45 degrees to either side: within a ripple of where it was."""
     x = rays(K, SIZE[1], SIZE[0])[..., 0]
     corner = (2 / (1 + x.abs())).log()[None]
-    changed = (flattened(corner, _errors(0.08)) - corner).abs()
+    changed = (flatten_ripples(corner, _errors(0.08)) - corner).abs()
     assert changed.max() < 0.02 and changed[:, :, : 56 - 2 * max(FLATTENING.radii) - 2].max() < 1e-9
 
 
@@ -89,13 +89,13 @@ def test_planes_are_those_of_least_squares(radius):
 def test_float32_is_close_to_float64_and_odd_sizes_work():
     logs = _rippled(_wall(), 0.01)
     exact, fast = (
-        flattened(logs, _errors(0.08)),
-        flattened(logs.float(), _errors(0.08).float()),
+        flatten_ripples(logs, _errors(0.08)),
+        flatten_ripples(logs.float(), _errors(0.08).float()),
     )
     assert (fast.double() - exact).abs().max() < 1e-5  # sums are float64; depths come with 7 digits
     for size in ((7, 5), (1, 1), (2, 33)):
         odd = torch.rand(3, *size)
-        kept = flattened(odd, torch.full_like(odd, -2.0))
+        kept = flatten_ripples(odd, torch.full_like(odd, -2.0))
         assert kept.shape == odd.shape and torch.isfinite(kept).all()
 
 
@@ -103,5 +103,5 @@ def test_far_and_near_stay_finite():
     for depth in (-4.0, 5.0, 40.0):
         logs = torch.zeros(1, 28, 28)
         logs[:, :, 14:] = depth
-        kept = flattened(logs, torch.full_like(logs, -5.0))
+        kept = flatten_ripples(logs, torch.full_like(logs, -5.0))
         assert torch.isfinite(kept).all() and (kept - logs).abs().max() < 0.05

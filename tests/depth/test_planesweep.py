@@ -11,12 +11,12 @@ from torch import Tensor
 from langflash_core.depth import planesweep
 from langflash_core.depth.planesweep import (
     _best,
-    _brought,
     _largest,
     _on_plane,
     _peaks,
     _planes,
     _Scene,
+    _warp_neighbour,
     _Windows,
 )
 from langflash_core.rig.rig import Rig
@@ -31,7 +31,7 @@ ALL = [[other for other in range(4) if other != view] for view in range(4)]
 
 
 def searched(logs: Tensor, photos: list[np.ndarray], poses: Tensor, Ks: Tensor, *more) -> Tensor:
-    return planesweep.searched(Rig.of_logs(logs, poses, Ks), photos, *more).log_depths
+    return planesweep.sweep_planes(Rig.of_logs(logs, poses, Ks), photos, *more).log_depths
 
 
 def surface(seed: int) -> np.ndarray:
@@ -157,7 +157,7 @@ def test_a_plane_is_what_its_depth_everywhere_is():
         own = np.full((HEIGHT, WIDTH), math.log(depth), np.float32)
         planes = _on_plane(scene, 0, ALL[0], 1 / depth)
         for other, found in zip(ALL[0], planes, strict=True):
-            twin = _brought(scene, 0, other, own)
+            twin = _warp_neighbour(scene, 0, other, own)
             slope = abs(np.diff(photos[other].astype(float), axis=1)).max()
             inside = (found > 0) & (twin > 0)
             inside = cv2.erode(inside.astype(np.uint8), np.ones((5, 5))) > 0

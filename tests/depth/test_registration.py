@@ -18,7 +18,7 @@ from torch.nn import functional as F
 
 from langflash_core.base.running import Run
 from langflash_core.depth.registration import (
-    registered,
+    register_depths,
     smooth,
 )
 from langflash_core.depth.surfaces import flatten, one_surface, sharpen
@@ -51,7 +51,7 @@ class Room:
     def registered(self, logs: Tensor, **more) -> Tensor:
         errors = torch.full_like(logs, -2.5)
         rig = Rig.of_logs(logs, self.viewmats, K.expand(len(logs), 3, 3), errors)
-        found = registered(rig, self.photos, **more)
+        found = register_depths(rig, self.photos, **more)
         assert found.log_errors is errors
         return found.log_depths
 
@@ -348,7 +348,7 @@ def test_small_maps(size):
     logs = torch.zeros(2, *size)
     rng = np.random.default_rng(0)
     photos = [rng.integers(0, 256, (3 * size[0], 3 * size[1]), dtype=np.uint8) for _ in range(2)]
-    found = registered(Rig.of_logs(logs, torch.eye(4).expand(2, 4, 4), K.expand(2, 3, 3), logs), photos)
+    found = register_depths(Rig.of_logs(logs, torch.eye(4).expand(2, 4, 4), K.expand(2, 3, 3), logs), photos)
     assert found.log_depths.shape == logs.shape and found.log_depths.isfinite().all()
 
 

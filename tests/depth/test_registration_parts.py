@@ -11,7 +11,7 @@ from torch import Tensor
 from langflash_core.depth.registration import (
     _Known,
     _Matches,
-    _triangulated,
+    _triangulate_matches,
     smooth,
 )
 from langflash_core.rig.settings import REGISTRATION
@@ -167,7 +167,7 @@ def _projected(logs: Tensor, pose: Tensor) -> Tensor:
 def test_triangulated_is_the_least_squares_of_each_pixel(noise):
     """scipy's in float64. float32: 1e-7 of rays of about 1 over parallaxes of about 1/30 at noise, 1e-5."""
     logs, true, matches, pose = _geometry(noise)
-    change, _ = _triangulated(logs.float(), matches, SMALL_K, SMALL_K, pose.float(), ALL)
+    change, _ = _triangulate_matches(logs.float(), matches, SMALL_K, SMALL_K, pose.float(), ALL)
     turned, shift, K = (_rays() @ pose[:3, :3].T).numpy(), pose[:3, 3].numpy(), SMALL_K.double().numpy()
     for r, c in np.ndindex(6, 7):
         q = [(float(m[r, c]) - K[i, 2]) / K[i, i] for i, m in enumerate((matches.x, matches.y))]
@@ -200,9 +200,9 @@ def test_of_a_line_the_shift_across_it_tells_depth(turn):
     across = (math.sin(line) ** 2, -math.sin(line) * math.cos(line), math.cos(line) ** 2, 1.0)
     known = _Known(*(np.full((6, 7), value, np.float32) for value in across))
     slid = _at(places + 0.2 * by * slide[:, None, None])
-    change, _ = _triangulated(logs.float(), slid, SMALL_K, SMALL_K, pose.float(), known)
+    change, _ = _triangulate_matches(logs.float(), slid, SMALL_K, SMALL_K, pose.float(), known)
     assert (change.double() - (true - logs)).abs().max() < 1e-3
-    fooled, _ = _triangulated(logs.float(), slid, SMALL_K, SMALL_K, pose.float(), ALL)
+    fooled, _ = _triangulate_matches(logs.float(), slid, SMALL_K, SMALL_K, pose.float(), ALL)
     assert (fooled.double() - (true - logs)).abs().max() > 0.05
 
 
@@ -210,7 +210,7 @@ def test_moves_are_the_differences_of_the_projection():
     """Central differences of 1e-5, float64: 1e-10. float32 knows a match, here of 10 pixels, to 1e-6."""
     logs, _, _, pose = _geometry(0.0)
     at = _at(_projected(logs, pose))
-    _, found = _triangulated(logs.float(), at, SMALL_K, SMALL_K, pose.float(), ALL)
+    _, found = _triangulate_matches(logs.float(), at, SMALL_K, SMALL_K, pose.float(), ALL)
     expected = (_projected(logs - 1e-5, pose) - _projected(logs + 1e-5, pose)) / 2e-5
     torch.testing.assert_close(found.double(), (expected**2).sum(0), rtol=2e-3, atol=1e-5)
 
@@ -224,8 +224,8 @@ def test_matches_that_no_depth_explains_say_nothing():
     reversed_pose = pose.clone()
     reversed_pose[:3, 3] *= -1
     for case, camera in ((matches, still), (broken, pose), (behind, reversed_pose)):
-        change, moved = _triangulated(logs.float(), case, SMALL_K, SMALL_K, camera.float(), ALL)
+        change, moved = _triangulate_matches(logs.float(), case, SMALL_K, SMALL_K, camera.float(), ALL)
         assert (change == 0).all() and (moved == 0).all()
     for far in (_projected(torch.full_like(logs, 20.0), pose), torch.full((2, 6, 7), torch.inf)):
-        found = _triangulated(logs.float(), _at(far), SMALL_K, SMALL_K, pose.float(), ALL)
+        found = _triangulate_matches(logs.float(), _at(far), SMALL_K, SMALL_K, pose.float(), ALL)
         assert all(values.isfinite().all() for values in found)

@@ -8,7 +8,7 @@ import torch
 from torch.nn import functional as F
 
 from langflash_core.depth import sharpening
-from langflash_core.depth.sharpening import sharpened
+from langflash_core.depth.sharpening import sharpen_depths
 from langflash_core.rig.settings import SHARPENING
 
 SIZE = 64
@@ -34,7 +34,7 @@ def _box(dtype: torch.dtype = torch.float32) -> tuple[torch.Tensor, torch.Tensor
 def test_a_smeared_step_becomes_the_photos_edge():
     depths, images = _box()
     smeared = _smeared(depths)
-    before, after = ((d.exp() - depths).abs() > 0.15 for d in (smeared, sharpened(smeared, images)))
+    before, after = ((d.exp() - depths).abs() > 0.15 for d in (smeared, sharpen_depths(smeared, images)))
     assert before.float().mean() > 0.15
     # What is left are corners, which the smear has rounded, and the feet of the slope, near one side anyway.
     assert after.sum() < 0.3 * before.sum()
@@ -42,7 +42,7 @@ def test_a_smeared_step_becomes_the_photos_edge():
 
 def test_no_depth_between_the_two_is_left_on_a_straight_edge():
     depths, images = _box()
-    row = sharpened(_smeared(depths), images).exp()[0, 32]
+    row = sharpen_depths(_smeared(depths), images).exp()[0, 32]
     between = (row > 1.5 * 1.12) & (row < 3.0 / 1.12)
     assert int(between.sum()) <= 2  # a pixel at each of two edges
 
@@ -53,7 +53,7 @@ def test_a_slanted_plane_stays(slope):
     column = torch.linspace(0, 1, SIZE)
     depths = (1.0 / (0.2 + 0.1 * slope * (0.2 + column))).expand(1, SIZE, SIZE)
     images = (torch.arange(SIZE) // 8 % 2).float().expand(1, 3, SIZE, SIZE)
-    changed = (sharpened(depths.log(), images) - depths.log()).abs()
+    changed = (sharpen_depths(depths.log(), images) - depths.log()).abs()
     assert changed.max() < 0.02  # a slope of 80 degrees is .02 a pixel
 
 
@@ -64,7 +64,7 @@ def test_thin_bars_survive():
         depths[:, :, first : first + 2] = 1.5
     images = torch.where(depths < 2, 0.2, 0.8)[:, None].expand(-1, 3, -1, -1).contiguous()
     known = depths.log()
-    kept = sharpened(known, images)
+    kept = sharpen_depths(known, images)
     torch.testing.assert_close(kept[depths < 2], known[depths < 2], atol=0.02, rtol=0)
     assert (kept - known).abs()[depths > 2].max() < 0.1
 
@@ -80,7 +80,7 @@ def test_sums_are_those_of_a_pixel_by_itself():
     wide = [
         F.pad(m, (SHARPENING.reach,) * 4, mode="replicate") for m in (logs[:, None], flat[:, None], colours)
     ]
-    found = sharpening._parted(wide[0], wide[1], middle, sharpening._places(), colours, wide[2])
+    found = sharpening._part_depths(wide[0], wide[1], middle, sharpening._places(), colours, wide[2])
     for row, column in ((20, 18), (0, 0), (39, 35), (3, 30)):
         sums = np.zeros((2, 2))
         for down, across in sharpening._places():
@@ -105,14 +105,14 @@ def test_hard_cases_stay_finite_and_within_what_was_there(far):
         logs = torch.zeros(2, *size)
         logs[:, :, size[1] // 2 :] = far
         for images in (torch.zeros(2, 3, *size), torch.rand(2, 3, *size)):
-            kept = sharpened(logs, images)
+            kept = sharpen_depths(logs, images)
             assert torch.isfinite(kept).all()
             assert kept.min() >= -1e-3 and kept.max() <= far + 1e-3  # float32 of 40
 
 
 def test_float32_chooses_as_float64():
     depths, images = _box(torch.float64)
-    exact = sharpened(_smeared(depths), images)
-    fast = sharpened(_smeared(depths).float(), images.float()).double()
+    exact = sharpen_depths(_smeared(depths), images)
+    fast = sharpen_depths(_smeared(depths).float(), images.float()).double()
     # A choice may fall the other way where both sides weigh the same to six digits.
     assert ((exact - fast).abs() > 1e-3).float().mean() < 0.002

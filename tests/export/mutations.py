@@ -71,7 +71,7 @@ def other_files(folder: Path) -> dict[str, bytes]:
     Image.fromarray(pixels[..., 0].astype(np.uint16) * 257).save(folder / "deep.png")
     pillow_heif.from_pillow(photo).save(folder / "a.heic")
     export(scene, folder / "spoken.ply")
-    marks = Marks.untouched(len(scene.gaussians), scene.semantics.num_atoms)
+    marks = Marks.without_edits(len(scene.gaussians), scene.semantics.num_atoms)
     history = History(marks).edited("hide", hide(marks, Mask.of(scene.gaussians.means[:, 0].numpy() > 0)))
     history = history.edited("rename", rename_atom(history.marks, 0, "seat"))
     save_history(history.undo(), scene, {"name": "made"}, folder / "a.edits")

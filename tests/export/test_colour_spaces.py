@@ -23,7 +23,7 @@ from langflash_core.geometry.fusion import Surface
 from langflash_core.geometry.harmonics import SH_C0
 from langflash_core.scene.bare import bare_scene
 from langflash_core.types import Frame, Scene
-from langflash_core.writing.encoding import encoded
+from langflash_core.writing.encoding import open_encoder
 from tests.export.splats import random_gaussians
 
 SRGB = (200, 60, 30)  # of 255
@@ -195,7 +195,7 @@ def test_pictures_are_srgb(tmp_path):
 def test_films_say_their_matrix(tmp_path, size):
     """Brightness is that of BT.709, and the file says so, whatever its size: what is unsaid is guessed."""
     imageio_ffmpeg = pytest.importorskip("imageio_ffmpeg")
-    with encoded(tmp_path / "a.mp4", size) as write:
+    with open_encoder(tmp_path / "a.mp4", size) as write:
         write(bytes(SRGB) * size[0] * size[1])
     program = imageio_ffmpeg.get_ffmpeg_exe()
     said = subprocess.run([program, "-i", tmp_path / "a.mp4"], capture_output=True, text=True).stderr

@@ -231,7 +231,7 @@ def seen_colours(gaussians: Gaussians, directions: torch.Tensor) -> torch.Tensor
 )
 def test_axes_turn_positions_shapes_and_colours_together(letters, matrix):
     """A Gaussian seen along d before looks the same seen along M d after."""
-    from langflash_core.export.packing import turned
+    from langflash_core.export.packing import transform_rows
     from langflash_core.export.stored import Rows
     from langflash_core.geometry.turning import axes_matrix
     from tests.geometry.spread import covariances
@@ -239,7 +239,7 @@ def test_axes_turn_positions_shapes_and_colours_together(letters, matrix):
     expected = torch.tensor(matrix, dtype=torch.float64)
     assert torch.equal(axes_matrix(letters), expected)
     before = random_gaussians(60, 3)
-    moved = turned(
+    moved = transform_rows(
         Rows(*(v.numpy() for v in (before.means, before.quats, before.scales, before.opacities, before.sh))),
         expected,
     )
@@ -477,7 +477,7 @@ def test_usd_in_half_precision_and_z_up(tmp_path):
 
 def test_usd_that_is_absent_is_said(tmp_path, monkeypatch):
     monkeypatch.setattr("langflash_core.export.usd._pxr", lambda: None)
-    monkeypatch.setattr("langflash_core.export.usd.installed", lambda: False)
+    monkeypatch.setattr("langflash_core.export.usd.is_installed", lambda: False)
     (tmp_path / "a.usda").write_text("#usda 1.0\n")
     with pytest.raises(SceneFileError, match=r"langflash\[usd\]"):
         read(tmp_path / "a.usda")

@@ -131,7 +131,7 @@ def test_the_picture_is_the_blend(opened, scene):
         assert decibels(theirs[..., 3], ours.alphas.numpy()) >= LEAST_DB
         parts, _ = compose.layers_of(scene, camera)
         frames = [reference.render(part, camera, weight_maps=False) for part in parts]
-        even = compose.blended(frames, np.full(len(frames), 1 / len(frames)))
+        even = compose.blend_layers(frames, np.full(len(frames), 1 / len(frames)))
         others = (frames[0], even, reference.render(scene, camera, weight_maps=False))
         assert all(decibels(other.rgb.numpy(), ours.rgb.numpy()) < LEAST_DB - 10 for other in others)
     moving_is_the_nearest_over_the_next(opened, scene)

@@ -17,7 +17,7 @@ from langflash_core.errors import OutputError, SceneFileError
 from langflash_core.export import export, read, spz
 from langflash_core.export.stored import ANTIALIASED, PLAIN
 from langflash_core.scene.bare import bare_scene
-from langflash_core.scene.joining import joined
+from langflash_core.scene.joining import join_scenes
 from langflash_core.scene.standing import on_its_head
 from langflash_core.types import Gaussians, Scene
 from tests.app.cli.conftest import stripes
@@ -190,7 +190,7 @@ def test_the_mark_outlives_language_beside_a_ply(tmp_path):
 
 def test_two_scenes_as_one_are_antialiased_where_both_are():
     for first, second in ((True, True), (True, False), (False, True), (False, False)):
-        both = joined(made(first), made(second))
+        both = join_scenes(made(first), made(second))
         assert both.record.antialiased is (first and second)
 
 

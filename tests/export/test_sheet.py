@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from langflash_core.export.sheet import captioned, contact_sheet
+from langflash_core.export.sheet import add_caption, contact_sheet
 
 
 def plain(level: int, height: int = 60, width: int = 80) -> np.ndarray:
@@ -19,10 +19,10 @@ def test_tiles_stand_in_rows_as_they_come():
 
 
 def test_a_caption_is_above_its_picture_and_stays_within():
-    cell = captioned(plain(0), "a caption that is much longer than eighty pixels")
+    cell = add_caption(plain(0), "a caption that is much longer than eighty pixels")
     assert cell.shape[1] == 84 and cell[:18].max() > 200 and not cell[18:].any()
     assert not cell[:, -2:].any()
-    assert np.array_equal(captioned(plain(7), "")[18:-4, 2:-2], plain(7))
+    assert np.array_equal(add_caption(plain(7), "")[18:-4, 2:-2], plain(7))
 
 
 def test_one_tile_is_a_sheet():

@@ -262,8 +262,8 @@ def test_whatever_up_is_turning_keeps_it_up(degrees: float, yaw: float, pitch: f
     tilt = rotations.about(moved.axes[:, 2], 0.3)
     aslant = Pose(reach=2.0, rotation=Rotation(*rotations.quaternion(tilt @ moved.axes)))
     assert poses.roll(aslant, up) == pytest.approx(0.3, abs=1e-7)
-    np.testing.assert_allclose(poses.righted(aslant, up).axes, moved.axes, atol=1e-7)
-    assert poses.roll(poses.righted(aslant, up, 0.5), up) == pytest.approx(0.15, abs=1e-7)
+    np.testing.assert_allclose(poses.make_upright(aslant, up).axes, moved.axes, atol=1e-7)
+    assert poses.roll(poses.make_upright(aslant, up, 0.5), up) == pytest.approx(0.15, abs=1e-7)
 
 
 def test_what_is_seen_of_a_line_is_what_lies_in_front():

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from langflash_core.errors import Cancelled, FilmError
-from langflash_core.images.film import opened
+from langflash_core.images.film import open_film
 from langflash_core.images.settings import LOOKING
 from tests import films
 
@@ -22,7 +22,7 @@ def nothing() -> None:
 def read(
     path: Path, start: float = 0.0, end: float | None = None, check: Callable[[], None] = nothing
 ) -> list[tuple[float, np.ndarray]]:
-    with opened(path) as reader:
+    with open_film(path) as reader:
         return list(reader.pictures(start, end, check))
 
 
@@ -42,7 +42,7 @@ def test_a_rotation_flag_is_followed(film: Path, degrees: int, turn: int) -> Non
     path = films.turned(film, degrees)
     _, first = read(path)[0]
     assert alike(first, cv2.rotate(FIRST, turn))
-    with opened(path) as reader:
+    with open_film(path) as reader:
         assert (reader.film.height, reader.film.width) == first.shape[:2]
 
 
@@ -147,6 +147,6 @@ def test_av1_is_read(film: Path) -> None:
 def test_without_a_program_pictures_that_come_equal_are_doubtful(fields: Path, film: Path, alone) -> None:
     # A second of interlaced pictures: 15 looks, the last whole one that they repeat, and one by rounding.
     for path, least, most in ((films.mixed(fields, 1.0), 15, 17), (film, 0, 0)):
-        with opened(path) as reader:
+        with open_film(path) as reader:
             count = sum(1 for _ in reader.pictures(0.0, None, nothing))
             assert least <= reader.doubtful <= most < count

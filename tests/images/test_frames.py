@@ -25,7 +25,7 @@ def home(monkeypatch, tmp_path: Path) -> Path:
 def chosen(path: Path, most: int = 32, **options) -> tuple[Strip, Choice]:
     strip = strip_of(path, **options)
     choice = choose(strip, most)
-    assert sum(choice.left.values()) + len(choice.chosen) == strip.looked
+    assert sum(choice.left.values()) + len(choice.chosen) == strip.num_looked_at
     return strip, choice
 
 
@@ -223,7 +223,7 @@ def test_nothing_is_decoded_twice(tmp_path: Path, home: Path, monkeypatch) -> No
     first.path(0).unlink()
     assert strip_of(path) == first and first.path(0).is_file(), "what is not whole is made again"
     films.write(path, films.walk(40))
-    assert strip_of(path).looked > first.looked, "another film of the same name"
+    assert strip_of(path).num_looked_at > first.num_looked_at, "another film of the same name"
 
 
 def test_only_the_last_films_are_kept(tmp_path: Path, home: Path, monkeypatch) -> None:
@@ -250,7 +250,7 @@ def test_a_long_film_keeps_a_bounded_number(tmp_path: Path, monkeypatch) -> None
     many = strip_of(path)
     monkeypatch.setattr(frames, "STILLS", replace(frames.STILLS, most_stills=10))
     few = strip_of(path, start=1e-9)  # another key of the cache
-    assert len(few.stills) <= 10 < len(many.stills) and few.looked == many.looked
+    assert len(few.stills) <= 10 < len(many.stills) and few.num_looked_at == many.num_looked_at
     assert len(list(few.folder.glob("*.jpg"))) == len(few.stills)
     assert choose(few, 32).gap < 1.0
 

@@ -6,7 +6,7 @@ import pytest
 import torch
 
 from langflash_core.base.records import FoundFocal
-from langflash_core.images.straight import after, bent, smallest_scale, straightened
+from langflash_core.images.straight import after, distort, smallest_scale, straighten_views
 from langflash_core.types import Lenses, Views
 
 SIZE, FOCAL = (112, 84), 90.0
@@ -49,7 +49,7 @@ def _views(k: float, times: int = 4) -> Views:
 def test_a_straightened_photo_is_a_straight_lens_own(k):
     """Within what cubic interpolation errs on these waves, and JPEG on the large one."""
     views = _views(k)
-    found = straightened(views, [FoundFocal(1.2, 0.01, 4, k, 0.01)])
+    found = straighten_views(views, [FoundFocal(1.2, 0.01, 4, k, 0.01)])
     focal = float(found.Ks[0, 0, 0]) * 1.2
     truth = _wall(_places(SIZE) / focal)
     shown, taken = (view.images[0].movedim(0, -1).numpy() for view in (found, views))
@@ -67,7 +67,7 @@ def test_no_pixel_is_without_a_photo_and_none_is_given_away(k):
     bend = k / FOCAL**2
     scale = smallest_scale(SIZE, np.array(SIZE) / 2, bend)
     corners = np.array([[x, y] for x in (0, 56, 112) for y in (0, 42, 84)]) - np.array(SIZE) / 2
-    reached = np.abs(bent(corners / scale, bend))
+    reached = np.abs(distort(corners / scale, bend))
     assert (reached <= np.array(SIZE) / 2 + 1e-3).all()
     assert (np.abs(reached - np.array(SIZE) / 2) < 1e-2).any()
     assert (scale < 1) == (k < 0)
@@ -83,7 +83,7 @@ def test_an_extreme_bend_stays_where_the_lens_is_one_to_one():
 def test_photos_without_a_bend_stay_as_they_are():
     views = _views(0.0)
     for found in ([None], [FoundFocal(1.2, 0.01, 4)]):
-        same = straightened(views, found)
+        same = straighten_views(views, found)
         assert torch.equal(same.images, views.images) and same.sources == views.sources
         assert torch.equal(same.Ks, views.Ks)
 
@@ -94,8 +94,8 @@ def test_two_rounds_are_one_bend():
     both = after(first, second)
     q = np.linspace(0, 0.7, 20)[:, None] * np.ones((1, 2)) / np.sqrt(2)
     # p2 = f2 (1 + k2 q^2) q is the straightened place, of which q1 = p2 / f1 went through the first lens
-    inner = bent(q, second.bend) * second.growth / first.growth
-    exact = bent(inner, first.bend) * first.growth
-    once = bent(q, both.bend) * both.growth
+    inner = distort(q, second.bend) * second.growth / first.growth
+    exact = distort(inner, first.bend) * first.growth
+    once = distort(q, both.bend) * both.growth
     assert np.abs(once - exact).max() < 0.05 * np.abs(exact - q * both.growth).max()
     assert after(None, second) == second

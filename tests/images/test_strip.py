@@ -11,7 +11,7 @@ from langflash_core.images import strip as module
 from langflash_core.images.pictures import photo_names
 from langflash_core.images.settings import CHOOSING, PHOTO_LIMITS
 from langflash_core.images.still_names import is_still, shown_name, still_name
-from langflash_core.images.strip import Still, Strip, choose, read_strip, written
+from langflash_core.images.strip import Still, Strip, choose, encode_index, read_strip
 
 
 def strip(places, sharpness, why_not=None, **more) -> Strip:
@@ -69,13 +69,13 @@ def test_names_carry_the_time_and_sort_by_it() -> None:
 def test_an_index_that_is_not_whole_is_none(tmp_path: Path) -> None:
     kept = strip([0.0, 0.1], [1.0, 2.0], notes=("a note",))
     assert read_strip(tmp_path) is None
-    (tmp_path / module.INDEX).write_bytes(written(kept))
+    (tmp_path / module.INDEX).write_bytes(encode_index(kept))
     assert read_strip(tmp_path) is None, "the frames are missing"
     for still in kept.stills:
         (tmp_path / still.file).touch()
     found = read_strip(tmp_path)
     assert found is not None and found.stills == kept.stills and found.notes == kept.notes
-    for content in (b"", b"[]", b"{}", written(kept).replace(b'"format": 3', b'"format": 2')):
+    for content in (b"", b"[]", b"{}", encode_index(kept).replace(b'"format": 3', b'"format": 2')):
         (tmp_path / module.INDEX).write_bytes(content)
         assert read_strip(tmp_path) is None
 

@@ -30,7 +30,7 @@ def test_the_turn_scale_and_shift_of_matches_are_found_among_wrong_ones():
     turn = Rotation.from_euler("y", 90.7, degrees=True).as_matrix()
     ours = 1.3 * theirs @ turn.T + [0.5, 0.1, -1.0]
     ours[::3] = rng.uniform(-3, 3, (20, 3))
-    fit = alignment._fitted(ours, theirs, 1.0)
+    fit = alignment._fit_transform(ours, theirs, 1.0)
     assert fit is not None and fit.matches >= 40 and fit.tried == 60
     assert fit.scale == pytest.approx(1.3, abs=0.01) and np.allclose(fit.turn, turn, atol=0.01)
     good = np.arange(60) % 3 > 0
@@ -39,9 +39,9 @@ def test_the_turn_scale_and_shift_of_matches_are_found_among_wrong_ones():
 
 def test_matches_that_agree_on_nothing_are_no_fit():
     rng = np.random.default_rng(1)
-    fit = alignment._fitted(rng.uniform(-2, 2, (30, 3)), rng.uniform(-2, 2, (30, 3)), 1.0)
+    fit = alignment._fit_transform(rng.uniform(-2, 2, (30, 3)), rng.uniform(-2, 2, (30, 3)), 1.0)
     assert fit is None or fit.matches < ALIGNMENT.least
-    assert alignment._fitted(np.zeros((1, 3)), np.zeros((1, 3)), 1.0) is None
+    assert alignment._fit_transform(np.zeros((1, 3)), np.zeros((1, 3)), 1.0) is None
 
 
 @pytest.mark.parametrize("times", [1.8, 0.55])
@@ -50,22 +50,22 @@ def test_a_wrong_guess_of_lengths_is_put_up_with_and_lengths_told_wrong_are_said
     rng = np.random.default_rng(2)
     theirs = rng.uniform(-2, 2, (60, 3))
     ours = times * theirs + [0.5, 0.1, -1.0]
-    monkeypatch.setattr(alignment, "_described", lambda found, render: ())
-    monkeypatch.setattr(alignment, "_matched", lambda first, second: (ours, theirs))
+    monkeypatch.setattr(alignment, "_describe_keypoints", lambda found, render: ())
+    monkeypatch.setattr(alignment, "_match_keypoints", lambda first, second: (ours, theirs))
     seen = replace(room, scene=replace(room.scene, photos=(b"", b"")))
     guessed = replace(seen, guess=Guess(2.0, 1.7, 2.4, ("door",)))
-    assert alignment.aligned(guessed, seen, render).scale == pytest.approx(times, abs=0.01)
-    assert alignment.aligned(seen, guessed, render).matches == 60
+    assert alignment.align_scenes(guessed, seen, render).scale == pytest.approx(times, abs=0.01)
+    assert alignment.align_scenes(seen, guessed, render).matches == 60
     with pytest.raises(InputError, match=r"told for both scenes, and they differ by 1\.8 times"):
-        alignment.aligned(seen, seen, render)
-    monkeypatch.setattr(alignment, "_matched", lambda first, second: (ours, theirs[::-1]))
+        alignment.align_scenes(seen, seen, render)
+    monkeypatch.setattr(alignment, "_match_keypoints", lambda first, second: (ours, theirs[::-1]))
     with pytest.raises(InputError, match="too little in common"):
-        alignment.aligned(guessed, seen, render)
+        alignment.align_scenes(guessed, seen, render)
 
 
 def test_three_changes_are_told_by_numbers(room, monkeypatch):
     """A chair goes 80 cm, the table goes away, and nothing else changes."""
-    monkeypatch.setattr(beside, "aligned", lambda first, second, render: SAME)
+    monkeypatch.setattr(beside, "align_scenes", lambda first, second, render: SAME)
     moved = ((CHAIRS[0][0] + 0.8, CHAIRS[0][1]), CHAIRS[1])
     after = inventory(box_room(chairs=moved, table=None).with_record(metric_scale=METRES))
     found = difference(room, after, render)
@@ -79,7 +79,7 @@ def test_three_changes_are_told_by_numbers(room, monkeypatch):
 
 
 def test_a_room_beside_itself_is_the_same(room, monkeypatch):
-    monkeypatch.setattr(beside, "aligned", lambda first, second, render: SAME)
+    monkeypatch.setattr(beside, "align_scenes", lambda first, second, render: SAME)
     found = difference(room, room, render)
     assert not (found.moved or found.came or found.went or found.unseen)
     # The identity is a product in float64, of places within ten metres.
@@ -87,7 +87,7 @@ def test_a_room_beside_itself_is_the_same(room, monkeypatch):
 
 
 def test_what_the_other_scene_calls_something_else_is_not_said_to_have_gone(room, monkeypatch):
-    monkeypatch.setattr(beside, "aligned", lambda first, second, render: SAME)
+    monkeypatch.setattr(beside, "align_scenes", lambda first, second, render: SAME)
     scene = box_room().with_record(metric_scale=METRES)
     atoms = scene.semantics.dictionary.clone()
     atoms[WORDS.index("table")] = language_space("minilm").encode(("stool",))[0]
@@ -99,7 +99,7 @@ def test_what_the_other_scene_calls_something_else_is_not_said_to_have_gone(room
 
 
 def test_what_no_photo_of_the_other_scene_looks_at_is_not_said_to_have_gone(room, monkeypatch):
-    monkeypatch.setattr(beside, "aligned", lambda first, second, render: SAME)
+    monkeypatch.setattr(beside, "align_scenes", lambda first, second, render: SAME)
     aside = box_room(table=None).with_record(metric_scale=METRES, world=room.world)
     turned = aside.viewmats.clone()
     turned[:, :3, :3] = turned.new_tensor([[-1.0, 0, 0], [0, 1, 0], [0, 0, -1]]) @ turned[:, :3, :3]

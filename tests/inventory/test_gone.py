@@ -61,7 +61,7 @@ def test_darker_photos_change_nothing(room):
 
 def test_what_no_inventory_lists_is_found_to_have_moved(room, monkeypatch):
     """A table that both scenes take for a part of the wall."""
-    monkeypatch.setattr(beside, "aligned", lambda first, second, render: SAME)
+    monkeypatch.setattr(beside, "align_scenes", lambda first, second, render: SAME)
 
     def misnamed(east):
         scene = box_room(chairs=(), table=(east, TABLE[1])).with_record(world=room.world)

@@ -10,7 +10,7 @@ import torch
 from langflash_core.errors import InputError, PromptError
 from langflash_core.inventory import inventory
 from langflash_core.inventory.things import upright_box
-from langflash_core.scene.joining import appended
+from langflash_core.scene.joining import append_part
 from langflash_core.scene.world import turn_of
 from tests.boxroom import (
     CHAIRS,
@@ -147,7 +147,7 @@ def with_more(room, points: np.ndarray, word: str):
     stands = np.stack((points[:, 0] - EYE[0], -points[:, 1], points[:, 2] - EYE[2]), 1)
     places = stands / whole.scale @ turn_of(whole.world) + np.array(whole.world.origin)
     moved = replace(some.gaussians, means=torch.from_numpy(places).float())
-    return appended(room, replace(some, gaussians=moved))
+    return append_part(room, replace(some, gaussians=moved))
 
 
 def test_a_line_is_no_thing(room):

@@ -11,7 +11,7 @@ def test_a_decoder_beats_its_basis_and_needs_no_length():
     angles = 6.28 * torch.rand(3000, generator=generator)
     curve = torch.stack([torch.sin(k * angles + k) for k in range(1, 9)], -1)  # one number decides eight
     features = F.normalize(curve, dim=-1)
-    decoder = Decoder.fitted(features, 3)
+    decoder = Decoder.fit(features, 3)
     coded = features @ decoder.basis.T
     linear = F.normalize(coded @ decoder.basis, dim=-1)
     decoded = F.normalize(decoder(coded), dim=-1)

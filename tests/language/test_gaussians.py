@@ -8,7 +8,7 @@ from torch.nn.functional import normalize
 
 from langflash_core.language import gaussians
 from langflash_core.language.gaussians import answering_shares, gaussian_relevance, photos_that_answer
-from langflash_core.language.relevance import compile_query, rivalled
+from langflash_core.language.relevance import compile_query, rival_terms
 from langflash_core.language.spaces import language_space
 from langflash_core.types import Gaussians, Scene, Semantics
 
@@ -42,7 +42,7 @@ def test_it_is_the_relevancy_of_each_feature(monkeypatch):
     positives = space.encode(["chair", "floor"]).double().numpy()
     negatives = space.encode(compiled.negative_texts).double().numpy()
     asked = ["chair", "floor"]
-    rivals = rivalled(scene.semantics.dictionary, space, asked, space.encode(asked)).double().numpy()
+    rivals = rival_terms(scene.semantics.dictionary, space, asked, space.encode(asked)).double().numpy()
     for row in range(200):
         pairs = [
             (int(k), float(value))

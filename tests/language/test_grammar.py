@@ -4,7 +4,7 @@ import time
 
 import pytest
 
-from langflash_core.language.grammar import read
+from langflash_core.language.grammar import read_phrase
 from langflash_core.language.looks import LOOKS
 from langflash_core.language.vocabulary import all_phrases
 
@@ -115,18 +115,18 @@ WHOLE = (
 
 @pytest.mark.parametrize(("phrase", "reading"), READINGS.items())
 def test_a_phrase_is_read(phrase: str, reading: str) -> None:
-    found = read(phrase)
+    found = read_phrase(phrase)
     assert (str(found), found.phrase, found.known, found.ignored) == (reading, phrase, True, ())
 
 
 @pytest.mark.parametrize("phrase", WHOLE)
 def test_a_phrase_stays_whole(phrase: str) -> None:
-    found = read(phrase)
+    found = read_phrase(phrase)
     assert found.whole and not found.narrows and found.head == phrase.strip().strip("\"'\u201c\u201d")
 
 
 def test_every_phrase_of_the_table_stays_whole() -> None:
-    assert [phrase for phrase in all_phrases() if not read(phrase).whole] == []
+    assert [phrase for phrase in all_phrases() if not read_phrase(phrase).whole] == []
 
 
 @pytest.mark.parametrize(
@@ -141,38 +141,45 @@ def test_every_phrase_of_the_table_stays_whole() -> None:
 def test_what_is_not_understood_is_ignored_and_kept_for_people(
     phrase: str, head: str, ignored: tuple[str, ...]
 ) -> None:
-    found = read(phrase)
+    found = read_phrase(phrase)
     assert (found.head, found.ignored, found.whole) == (head, ignored, False)
 
 
 def test_a_head_that_nobody_knows_is_told_apart() -> None:
-    found = read("red typewriter")
+    found = read_phrase("red typewriter")
     assert (found.head, found.known, str(found)) == ("typewriter", False, "typewriter, red")
-    assert not read("typewriter").known and read("chair").known and read('"typewriter"').known
+    assert (
+        not read_phrase("typewriter").known
+        and read_phrase("chair").known
+        and read_phrase('"typewriter"').known
+    )
 
 
 def test_two_names_in_a_row_are_one() -> None:
-    assert read("floor lamp").whole and str(read("white island lamp")) == "island lamp, white"
+    assert read_phrase("floor lamp").whole and str(read_phrase("white island lamp")) == "island lamp, white"
 
 
 def test_words_that_a_person_taught_are_heads() -> None:
-    assert str(read("white stuhl", ["Stuhl"])) == "stuhl, white" and read("stuhl", ["Stuhl"]).known
-    assert read("spider-man pillow", ["spider-man pillow"]).whole
+    assert (
+        str(read_phrase("white stuhl", ["Stuhl"])) == "stuhl, white" and read_phrase("stuhl", ["Stuhl"]).known
+    )
+    assert read_phrase("spider-man pillow", ["spider-man pillow"]).whole
 
 
 def test_a_plural_means_several_and_a_superlative_one() -> None:
     most = {
-        phrase: read(phrase).modifiers[0].most for phrase in ("left chair", "left chairs", "biggest chairs")
+        phrase: read_phrase(phrase).modifiers[0].most
+        for phrase in ("left chair", "left chairs", "biggest chairs")
     }
     assert most == {"left chair": True, "left chairs": False, "biggest chairs": True}
 
 
 def test_heads_are_those_of_the_related_things_too() -> None:
-    assert read("cushion on the white sofa behind the table").heads == ("cushion", "sofa", "table")
+    assert read_phrase("cushion on the white sofa behind the table").heads == ("cushion", "sofa", "table")
 
 
 def test_every_look_is_read() -> None:
-    assert [str(read(f"{look} chair")) for look in LOOKS if look != "wooden"] == [
+    assert [str(read_phrase(f"{look} chair")) for look in LOOKS if look != "wooden"] == [
         f"chair, {look}"
         for look in LOOKS
         if look != "wooden"  # "wooden chair" is a phrase of the table
@@ -181,11 +188,11 @@ def test_every_look_is_read() -> None:
 
 def test_it_takes_less_than_a_millisecond() -> None:
     """The median of many: the machine does other things too."""
-    read("chair")
+    read_phrase("chair")
     for phrase in (*list(READINGS)[::7], "a very " * 11 + "chair", "on the left of " * 6):
         taken = []
         for _ in range(31):
             started = time.perf_counter()
-            read(phrase)
+            read_phrase(phrase)
             taken.append(time.perf_counter() - started)
         assert sorted(taken)[15] < 1e-3, phrase

@@ -7,7 +7,7 @@ import pytest
 import torch
 
 from langflash_core import pipeline
-from langflash_core.language.grammar import read
+from langflash_core.language.grammar import read_phrase
 from langflash_core.language.narrowing import Sight, choose, viewer_axes
 from langflash_core.types import Scene
 from tests.boxroom import box_room
@@ -153,7 +153,7 @@ def two_ladders(orange: float, elsewhere: float) -> Sight:
     ],
 )
 def test_the_one_that_stands_out_is_meant(orange: float, elsewhere: float, sizes: list[int]) -> None:
-    kept = choose(read("orange ladder"), two_ladders(orange, elsewhere)).kept
+    kept = choose(read_phrase("orange ladder"), two_ladders(orange, elsewhere)).kept
     assert [len(each.rows) for each in kept] == sizes
 
 

@@ -11,7 +11,7 @@ from langflash_core.language.relevance import (
     compile_query,
     finite_dictionary,
     relevance_maps,
-    rivalled,
+    rival_terms,
 )
 from langflash_core.language.rivals import alike, rivalry
 from langflash_core.language.settings import RIVALS
@@ -58,7 +58,9 @@ def test_a_compiled_query_holds_it(repeated):
     semantics = semantics_of(dictionary)
     asked = ["couch", "tv"]
     query, phrases = compile_query(semantics, space, asked), space.encode(asked)
-    expected = dictionary @ phrases.T + rivalled(finite_dictionary(semantics, space), space, asked, phrases)
+    expected = dictionary @ phrases.T + rival_terms(
+        finite_dictionary(semantics, space), space, asked, phrases
+    )
     # float32 products of length 1, and what the inverse loses to `_SAME`.
     assert torch.allclose(query.factor @ query.prompts.T, expected, rtol=0, atol=2e-6)
 
@@ -86,10 +88,13 @@ def test_names_of_the_same_thing_are_no_rivals():
     ]
     space = language_space()
     picture, wall = space.encode(["picture", "wall"]).split(1)
-    added = rivalled(picture, replace(space, rivals=("picture",)), ["painting"], space.encode(["painting"]))
+    added = rival_terms(
+        picture, replace(space, rivals=("picture",)), ["painting"], space.encode(["painting"])
+    )
     assert added.item() == pytest.approx(RIVALS.lead)
     assert (
-        rivalled(wall, replace(space, rivals=("wall",)), ["painting"], space.encode(["painting"])).item() < 0
+        rival_terms(wall, replace(space, rivals=("wall",)), ["painting"], space.encode(["painting"])).item()
+        < 0
     )
 
 
@@ -100,12 +105,12 @@ def test_a_name_written_apart_is_the_name():
         [True, True], [False, False], [False, False], [False, False],
     ]  # fmt: skip
     wall, stand = space.encode(["wall", "night stand"]).split(1)
-    assert rivalled(wall, space, ["night stand"], stand).item() == pytest.approx(RIVALS.lead)
+    assert rival_terms(wall, space, ["night stand"], stand).item() == pytest.approx(RIVALS.lead)
 
 
 def test_nothing_has_no_rivals():
     space = language_space()
-    added = rivalled(space.encode(["tv"]), replace(space, rivals=()), ["couch"], space.encode(["couch"]))
+    added = rival_terms(space.encode(["tv"]), replace(space, rivals=()), ["couch"], space.encode(["couch"]))
     assert added.tolist() == [[0.0]]
     query = compile_query(semantics_of(torch.zeros(0, 384)), language_space(), ["tv"])
     assert query.prompts.shape == (1, 0)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from langflash_core.language.things import Thing, gap, related
+from langflash_core.language.things import Thing, gap, is_related
 
 _RNG = np.random.default_rng(0)
 _FIRST = iter(range(0, 10**9, 10**4))
@@ -87,29 +87,29 @@ FALSE = [
 
 @pytest.mark.parametrize(("thing", "relation", "other"), TRUE)
 def test_things_that_stand_so(thing: Thing, relation: str, other: Thing) -> None:
-    assert related(thing, relation, [[other]])
+    assert is_related(thing, relation, [[other]])
 
 
 @pytest.mark.parametrize(("thing", "relation", "other"), FALSE)
 def test_things_that_do_not(thing: Thing, relation: str, other: Thing) -> None:
-    assert not related(thing, relation, [[other]])
+    assert not is_related(thing, relation, [[other]])
 
 
 def test_between_is_between_two_things_or_two_of_a_kind() -> None:
-    assert related(TABLE, "between", [[SOFA], [CHAIR]]) and related(TABLE, "between", [[SOFA, CHAIR]])
-    assert not related(CHAIR, "between", [[SOFA], [TABLE]]) and not related(TABLE, "between", [[CHAIR]])
-    assert not related(PICTURE, "between", [[SOFA], [CHAIR]])
+    assert is_related(TABLE, "between", [[SOFA], [CHAIR]]) and is_related(TABLE, "between", [[SOFA, CHAIR]])
+    assert not is_related(CHAIR, "between", [[SOFA], [TABLE]]) and not is_related(TABLE, "between", [[CHAIR]])
+    assert not is_related(PICTURE, "between", [[SOFA], [CHAIR]])
 
 
 def test_a_thing_is_not_related_to_itself_nor_to_nothing() -> None:
-    assert not related(CHAIR, "beside", [[CHAIR]]) and not related(CHAIR, "on", [[]])
-    assert related(CHAIR, "beside", [[CHAIR, TABLE]])
+    assert not is_related(CHAIR, "beside", [[CHAIR]]) and not is_related(CHAIR, "on", [[]])
+    assert is_related(CHAIR, "beside", [[CHAIR, TABLE]])
 
 
 def test_what_covers_both_belongs_to_the_thing() -> None:
     """A wall's answer goes on over the picture that hangs there."""
     both = Thing(np.concatenate((WALL.rows, PICTURE.rows)), np.concatenate((WALL.places, PICTURE.places)))
-    assert related(PICTURE, "on", [[both]])
+    assert is_related(PICTURE, "on", [[both]])
 
 
 def test_the_gap_is_the_distance_of_the_nearest_points() -> None:
@@ -120,4 +120,4 @@ def test_the_gap_is_the_distance_of_the_nearest_points() -> None:
 
 def test_one_point_is_a_thing() -> None:
     one = Thing(np.array([7]), np.array([[0.0, -0.74, 2.9]]))
-    assert related(one, "on", [[TABLE]]) and not related(TABLE, "on", [[one]])
+    assert is_related(one, "on", [[TABLE]]) and not is_related(TABLE, "on", [[one]])

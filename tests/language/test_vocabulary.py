@@ -2,7 +2,15 @@
 
 from langflash_core.lab.rooms.catalogue import labels
 from langflash_core.language import vocabulary
-from langflash_core.language.vocabulary import BROADER, EVALUATED, OWN, content, groups_of, is_name, taught
+from langflash_core.language.vocabulary import (
+    BROADER,
+    EVALUATED,
+    OWN,
+    content,
+    groups_of,
+    is_name,
+    is_trainable,
+)
 
 
 def own_phrases() -> list[str]:
@@ -13,10 +21,10 @@ def test_nothing_that_is_evaluated_is_taught():
     trained = [*own_phrases(), *BROADER, *OWN]
     assert not set(trained) & set(EVALUATED)
     assert not {content(p) for p in trained} & {content(p) for p in EVALUATED}
-    assert not any(taught(phrase) for phrase in EVALUATED)
-    assert not taught("A place to sleep in")
-    assert not taught("bookshelves")
-    assert taught("used for sleeping")
+    assert not any(is_trainable(phrase) for phrase in EVALUATED)
+    assert not is_trainable("A place to sleep in")
+    assert not is_trainable("bookshelves")
+    assert is_trainable("used for sleeping")
 
 
 def test_a_phrase_means_one_group_or_is_listed_as_broader():

@@ -6,7 +6,7 @@ import pytest
 from torch import Tensor
 
 from langflash_core.base.detail import DETAILS
-from langflash_core.mending.looks import drawn
+from langflash_core.mending.looks import draw_scene
 from langflash_core.surface.fine import coloured_scene, covered_scene
 from langflash_core.types import Scene
 from tests.scene.photographed import SCREEN, WALL, photographed
@@ -42,4 +42,4 @@ def known() -> Known:
 
 @pytest.fixture
 def draw():
-    return drawn
+    return draw_scene

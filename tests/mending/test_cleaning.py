@@ -7,7 +7,7 @@ import pytest
 
 from langflash_core.errors import InputError
 from langflash_core.geometry.cameras import invert_rigid
-from langflash_core.mending.cleaning import box_of, cleaned, inside, taken_out
+from langflash_core.mending.cleaning import apply_recipe, box_of, inside, taken_out
 from langflash_core.mending.recipes import Recipe, load_recipe, parsed_box, parsed_rule, save_recipe
 from langflash_core.scene.instances import disc_radii
 
@@ -68,7 +68,7 @@ def test_a_rule_holds_where_all_of_its_conditions_do(known):
     limit = float(np.median(radii))
     eyes = invert_rigid(scene.viewmats.double())[:, :3, 3].numpy()
     recipe = Recipe(rules=(parsed_rule(f"size>{limit},depth<1"), parsed_rule("confidence<.5")))
-    found = cleaned(scene, recipe).rows
+    found = apply_recipe(scene, recipe).rows
     assert scene.confidences is not None
     for row in range(0, len(found), 37):
         mean = scene.gaussians.means[row].double().numpy()
@@ -79,19 +79,19 @@ def test_a_rule_holds_where_all_of_its_conditions_do(known):
 
 
 def test_colours_and_photos_can_be_asked_for(known):
-    dark = cleaned(known.scene, Recipe(rules=(parsed_rule("colour~#264d53:.12"),))).rows
+    dark = apply_recipe(known.scene, Recipe(rules=(parsed_rule("colour~#264d53:.12"),))).rows
     assert (dark & known.members.numpy()).sum() > 0.5 * dark.sum() > 20
-    unseen = cleaned(known.scene, Recipe(rules=(parsed_rule("photos<1"),))).rows
-    seen = cleaned(known.scene, Recipe(rules=(parsed_rule("photos>0"),))).rows
+    unseen = apply_recipe(known.scene, Recipe(rules=(parsed_rule("photos<1"),))).rows
+    seen = apply_recipe(known.scene, Recipe(rules=(parsed_rule("photos>0"),))).rows
     assert unseen.any() and seen.any() and (unseen ^ seen).all()
 
 
 def test_inverted_and_boxed(known):
     scene = known.scene
     rule = (parsed_rule("opacity>.5"),)
-    found, others = (cleaned(scene, Recipe(rules=rule, invert=invert)) for invert in (False, True))
+    found, others = (apply_recipe(scene, Recipe(rules=rule, invert=invert)) for invert in (False, True))
     assert (found.rows ^ others.rows).all() and found.rows.any()
-    boxed = cleaned(scene, Recipe(crop="core"))
+    boxed = apply_recipe(scene, Recipe(crop="core"))
     assert 0 < boxed.rows.sum() < 0.1 * len(found.rows)
     assert sum(boxed.counts.values()) == boxed.rows.sum()
 

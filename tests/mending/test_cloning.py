@@ -9,7 +9,7 @@ import torch
 from langflash_core.errors import InputError
 from langflash_core.geometry.quaternions import quats_to_matrices
 from langflash_core.mending.cloning import Stroke, clone
-from langflash_core.scene.joining import appended
+from langflash_core.scene.joining import append_part
 from langflash_core.types import Camera, Scene
 from tests.app.window.scenes import room
 
@@ -69,7 +69,7 @@ def test_the_wall_is_laid_on_the_floor_turned_by_their_normals(scene, draw):
 def test_what_was_there_goes_and_the_picture_shows_the_copy(scene, draw):
     stroke = stroke_on(scene, (0.3, 0.4, 1.15))
     part, gone = clone(scene, every(scene), (0.6, -0.2, 1.3), stroke, draw)
-    done = appended(scene.rows(~gone), part)
+    done = append_part(scene.rows(~gone), part)
     before, after = (draw(each, stroke.camera) for each in (scene, done))
     inner = torch.from_numpy(disc(*stroke.start, stroke.radius - 4))
     assert float((after.alphas[inner] > 0.9).float().mean()) > 0.98

@@ -7,7 +7,7 @@ import pytest
 import torch
 
 from langflash_core.geometry.harmonics import SH_C0
-from langflash_core.mending.coarse import coarsened, quantised
+from langflash_core.mending.coarse import coarsen, quantise_colours
 from langflash_core.mending.settings import COARSENING
 from langflash_core.scene.thin import covered_areas
 
@@ -17,7 +17,7 @@ SIDE = 0.15
 @pytest.mark.parametrize("squares", [True, False])
 def test_a_block_is_the_mean_of_its_cube(known, squares):
     part = known.scene.rows(known.members)
-    made = coarsened(part, SIDE, squares=squares)
+    made = coarsen(part, SIDE, squares=squares)
     means = part.gaussians.means.double().numpy()
     colours = (0.5 + SH_C0 * part.gaussians.sh[:, 0].double()).numpy()
     areas, cubes = covered_areas(part.gaussians), np.floor(means / SIDE).astype(int)
@@ -38,7 +38,7 @@ def test_what_is_made_is_coarse_and_whole(known):
     part = known.scene.rows(known.members)
     more = torch.ones(len(part.gaussians), 3, 3)
     rough = replace(part.gaussians, sh=torch.cat((part.gaussians.sh, more), 1))
-    made = coarsened(replace(part, gaussians=rough), SIDE, squares=True)
+    made = coarsen(replace(part, gaussians=rough), SIDE, squares=True)
     assert made.gaussians.sh.shape[1] == 1  # harmonics are gone
     assert made.levels is not None and not bool(made.levels.any())
     totals = made.semantics.weight_values.sum(1)
@@ -50,17 +50,17 @@ def test_what_is_made_is_coarse_and_whole(known):
 def test_places_are_steps(known):
     """One place a block, in eighths of its side: what a block is made of moves it only in steps."""
     part = known.scene.rows(known.members)
-    still = coarsened(part, SIDE, squares=True)
+    still = coarsen(part, SIDE, squares=True)
     moved = replace(part.gaussians, means=part.gaussians.means + 1e-5)
-    again = coarsened(replace(part, gaussians=moved), SIDE, squares=True)
+    again = coarsen(replace(part, gaussians=moved), SIDE, squares=True)
     same = torch.cdist(still.gaussians.means, again.gaussians.means).amin(1) < 1e-6
     assert float(same.float().mean()) > 0.9
 
 
 def test_a_side_of_nothing_is_refused(known):
     with pytest.raises(ValueError, match="above 0"):
-        coarsened(known.scene, 0.0, squares=True)
+        coarsen(known.scene, 0.0, squares=True)
 
 
 def test_quantised_has_sixteen_levels():
-    assert len(set(quantised(torch.linspace(-1, 2, 999)).tolist())) == COARSENING.levels
+    assert len(set(quantise_colours(torch.linspace(-1, 2, 999)).tolist())) == COARSENING.levels

@@ -6,9 +6,9 @@ import torch
 from langflash_core.mending.filling import fill
 from langflash_core.mending.hiding import preview
 from langflash_core.mending.planes import planes
-from langflash_core.mending.texture import healed, spread
-from langflash_core.scene.gaps import filled
-from langflash_core.scene.joining import appended
+from langflash_core.mending.texture import diffuse, heal
+from langflash_core.scene.gaps import fill_gaps
+from langflash_core.scene.joining import append_part
 
 
 def psnr(shown, truth, where) -> float:
@@ -22,14 +22,14 @@ def test_a_wall_goes_on_behind_what_was_removed(known, draw):
     patch = fill(scene, rows, draw)
     unit = float(left.gaussians.means[:, 2].median())
     assert float((patch.gaussians.means[:, 2] / unit - 1).abs().quantile(0.95)) < 0.02
-    done = appended(left, patch)
+    done = append_part(left, patch)
     for view in range(scene.num_views):
         truth = known.without[view].movedim(0, -1).numpy()
         camera = scene.camera(view, truth.shape[1], truth.shape[0])
         before, after = (draw(each, camera, weight_maps=False) for each in (left, done))
         hole = (before.alphas < 0.5).numpy()
         assert hole.sum() > 200 and float((after.alphas[torch.from_numpy(hole)] > 0.9).float().mean()) > 0.97
-        gaps = filled(before.rgb, before.alphas).numpy()
+        gaps = fill_gaps(before.rgb, before.alphas).numpy()
         assert psnr(after.rgb.numpy(), truth, hole) > max(16, psnr(gaps, truth, hole) - 1)
         assert psnr(after.rgb.numpy(), truth, hole) > psnr(before.rgb.numpy(), truth, hole) + 8
 
@@ -66,7 +66,7 @@ def test_texture_goes_on_in_a_hole():
     hole = np.zeros((60, 80), bool)
     hole[24:36, 30:50] = True
     damaged = np.where(hole[..., None], 0, truth)
-    better, smooth = healed(damaged, ~hole, hole), spread(damaged, ~hole)
+    better, smooth = heal(damaged, ~hole, hole), diffuse(damaged, ~hole)
     assert np.array_equal(better[~hole], truth[~hole])
     assert psnr(better, truth, hole) > psnr(smooth, truth, hole) + 6
 
@@ -74,5 +74,5 @@ def test_texture_goes_on_in_a_hole():
 def test_spread_reaches_everything_and_keeps_what_is_even():
     known = np.zeros((30, 200), bool)
     known[3, 4] = True
-    assert np.allclose(spread(np.full((30, 200, 3), 0.3), known), 0.3, atol=1e-4)
-    assert not spread(np.ones((5, 5, 3)), np.zeros((5, 5), bool)).any()
+    assert np.allclose(diffuse(np.full((30, 200, 3), 0.3), known), 0.3, atol=1e-4)
+    assert not diffuse(np.ones((5, 5, 3)), np.zeros((5, 5), bool)).any()

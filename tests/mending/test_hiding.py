@@ -12,8 +12,8 @@ from PIL import Image
 from langflash_core.errors import InputError, SceneFileError
 from langflash_core.geometry.cameras import invert_rigid
 from langflash_core.mending.hiding import Hiding, hide, least_margins, preview
-from langflash_core.mending.looks import drawn
-from langflash_core.mending.photos import grown, reaches
+from langflash_core.mending.looks import draw_scene
+from langflash_core.mending.photos import dilate_mask, reaches
 from langflash_core.scene.file import load, save
 from langflash_core.types import Camera, Record
 
@@ -26,7 +26,7 @@ def done(known, tmp_path_factory):
     """Every way to hide the screen: the scene out of its file, the report, and the file's bytes."""
     folder, made = tmp_path_factory.mktemp("hidden"), {}
     for how in HOWS:
-        scene, report = hide(known.scene, known.members, drawn, Hiding(how, BLOCKS))
+        scene, report = hide(known.scene, known.members, draw_scene, Hiding(how, BLOCKS))
         save(scene, folder / how)
         made[how] = load(folder / how), report, (folder / how).read_bytes()
     return made
@@ -203,8 +203,10 @@ def test_the_least_margin_of_a_pixel_is_its_distance_from_the_mask():
     true = np.where(far <= 2, 0.0, far / 40)
     assert np.abs(reaches(mask) - true).max() < 1e-6  # float32
     for margin in (0.0, 0.06, 0.11):
-        assert (grown(mask, margin) == (true <= margin)).all()
-    assert np.isinf(reaches(np.zeros((5, 6), bool))).all() and not grown(np.zeros((5, 6), bool), 1.0).any()
+        assert (dilate_mask(mask, margin) == (true <= margin)).all()
+    assert (
+        np.isinf(reaches(np.zeros((5, 6), bool))).all() and not dilate_mask(np.zeros((5, 6), bool), 1.0).any()
+    )
 
 
 def test_the_least_margins_are_those_of_every_preview(known, draw):

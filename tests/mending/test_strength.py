@@ -9,8 +9,8 @@ import torch
 from langflash_core.errors import InputError
 from langflash_core.geometry.quaternions import matrices_to_quats
 from langflash_core.mending.recipes import KINDS
-from langflash_core.mending.strength import chosen, kind_strengths, least_strengths
-from langflash_core.scene.joining import appended
+from langflash_core.mending.strength import choose_removed, kind_strengths, least_strengths
+from langflash_core.scene.joining import append_part
 
 COUNT = 24
 
@@ -42,14 +42,14 @@ def planted(known):
     )
     whole = scene
     for part in parts:
-        whole = appended(whole, part)
+        whole = append_part(whole, part)
     return whole
 
 
 def test_what_was_planted_is_found(known, planted):
     own = len(known.scene.gaussians)
     least = least_strengths(planted, np.ones(len(planted.gaussians), bool))
-    found = chosen(least, 1.0)
+    found = choose_removed(least, 1.0)
     assert found[:own].mean() < 0.03
     for place, kind in enumerate(KINDS):
         assert found[own + place * COUNT :][:COUNT].mean() > 0.8, kind
@@ -59,10 +59,10 @@ def test_more_strength_takes_more_and_none_nothing(planted):
     least = least_strengths(planted, np.ones(len(planted.gaussians), bool))
     before = np.zeros(len(least), bool)
     for strength in (0.0, 0.25, 0.5, 1.0):
-        found = chosen(least, strength)
+        found = choose_removed(least, strength)
         assert not (before & ~found).any()
         before = found
-    assert not chosen(least, 0.0).any() and before.any()
+    assert not choose_removed(least, 0.0).any() and before.any()
 
 
 def test_strengths_hold_in_every_unit(planted):

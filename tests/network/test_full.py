@@ -13,7 +13,7 @@ from langflash_core.network.points.resection import depths_and_confidences, rese
 from langflash_core.network.precision import has_bfloat16
 from langflash_core.network.presets import MaskFilter
 from langflash_core.network.semantics.grouping import Groups
-from langflash_core.network.semantics.residual import filtered
+from langflash_core.network.semantics.residual import filter_queries
 from langflash_core.types import Views
 from tests.network.sizes import TINY, large
 
@@ -149,7 +149,7 @@ def test_a_camera_is_found_from_its_point_map():
     points, K, viewmat = _seen_points(noise=0.005)
     points[:, :30] = torch.rand(3, 30, 128)  # a quarter of the map is wrong
     found = resect(points, K)
-    assert found.trusted and 0.6 < found.share < 0.8
+    assert found.is_trusted and 0.6 < found.share < 0.8
     # 3,000 points with 0.3 px of noise: a few hundredths of a pixel, 1e-3 leaves a margin of ten.
     np.testing.assert_allclose(found.viewmat, viewmat.numpy(), atol=2e-3)
     depths, trust = depths_and_confidences(points[None], viewmat[None], K[None])
@@ -166,7 +166,7 @@ def test_a_point_map_of_nothing_places_no_camera(kind):
         "one place": torch.ones(3, 64, 64),
     }[kind]
     found = resect(points, torch.tensor([[60.0, 0, 32], [0, 60.0, 32], [0, 0, 1]]))
-    assert not found.trusted
+    assert not found.is_trusted
     assert np.isfinite(found.viewmat).all()
 
 
@@ -207,9 +207,9 @@ def test_the_released_filter_equals_its_twin():
     )
     expected = _brute_filter(logits, scores, rule)
     assert 3 < len(expected) < 30  # every condition has something to do
-    assert filtered(groups, rule).tolist() == expected
+    assert filter_queries(groups, rule).tolist() == expected
     nothing = Groups(groups.mask_logits - 100, groups.existence_logits)
-    assert filtered(nothing, rule).tolist() == []
+    assert filter_queries(nothing, rule).tolist() == []
 
 
 def test_masks_add_up_over_the_layers(tiny):

@@ -7,13 +7,13 @@ import pytest
 import torch
 from torch.nn import functional as F
 
-from langflash_core.depth.sharpening import sharpened
+from langflash_core.depth.sharpening import sharpen_depths
 from langflash_core.depth.surfaces import one_by_one
 from langflash_core.geometry.cameras import invert_rigid, rays
 from langflash_core.geometry.quaternions import quats_to_matrices
 from langflash_core.network.gaussians import CHANNELS, assemble_gaussians, footprints
 from langflash_core.network.model import pooled_weights
-from langflash_core.network.sweep import Compared, gathered, patches, sweep_correlation
+from langflash_core.network.sweep import Compared, patches, sample_bilinear, sweep_correlation
 from langflash_core.rig.rig import DepthMaps
 from tests.geometry.spread import covariances
 
@@ -65,7 +65,7 @@ def test_vectors_are_gathered_as_grid_sample_has_them():
     places = torch.rand(2, 40, 3, dtype=torch.float64) * 2 - 1
     places[:, 0, :2] = torch.tensor([[-1.0, 1.0], [1.0, -1.0]])
     table = Compared.of(maps, (6, 9)).table[1]
-    found = gathered(table, (6, 9), places)
+    found = sample_bilinear(table, (6, 9), places)
     expected = F.grid_sample(maps[1:], places.movedim(0, -1)[None], align_corners=False)[0]
     assert torch.allclose(found, expected.movedim(0, -1), rtol=0, atol=1e-12)
 
@@ -244,8 +244,8 @@ def test_views_one_by_one_give_what_all_at_once_do(untrained):
     torch.testing.assert_close(
         one_by_one(untrained.local, images), untrained.local(images), atol=1e-5, rtol=0
     )
-    found = one_by_one(sharpened, depths, images)
-    torch.testing.assert_close(found, sharpened(depths, images), atol=1e-5, rtol=0)
+    found = one_by_one(sharpen_depths, depths, images)
+    torch.testing.assert_close(found, sharpen_depths(depths, images), atol=1e-5, rtol=0)
 
 
 def test_weights_are_pooled_as_adaptive_pooling_has_them():

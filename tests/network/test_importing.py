@@ -17,7 +17,7 @@ from safetensors.torch import save_file
 from langflash_core.errors import WeightsError
 from langflash_core.network import LangFlashNet, PointMapNet, build_network, save_network
 from langflash_core.network.checkpoints.importing import convert, read_checkpoint
-from langflash_core.network.checkpoints.parts import installed, part_folder, read_part, read_tensors
+from langflash_core.network.checkpoints.parts import installed_parts, part_folder, read_part, read_tensors
 from langflash_core.network.checkpoints.store import assemble_network, install, verify_part
 from langflash_core.types import Views
 from tests.network import published
@@ -53,7 +53,7 @@ def _installed_network(tmp_path: Path, *, grouping: bool = True) -> PointMapNet:
 
 def test_imported_saved_and_loaded_is_the_same_network(tmp_path, home):
     network = _installed_network(tmp_path)
-    assert [part.modules for part in installed(TINY)] == [
+    assert [part.modules for part in installed_parts(TINY)] == [
         ("decoder", "encoder", "gaussian_heads", "point_heads"),
         ("grouping", "scratch"),
         ("language_head",),

@@ -3,7 +3,7 @@
 import torch
 
 from langflash_core.network.gaussians import footprints
-from langflash_core.network.occlusion import extended, over_edges, under_edges
+from langflash_core.network.occlusion import extend_surfaces, over_edges, under_edges
 
 K = torch.tensor([[40.0, 0, 16], [0, 40.0, 12], [0, 0, 1]])[None]
 
@@ -18,7 +18,7 @@ def _step() -> torch.Tensor:
 def test_only_the_last_pixel_of_the_background_moves_and_under_the_thing():
     logs = _step()
     pos, scales = torch.zeros(1, 24, 32, 3), torch.full((1, 24, 32, 3), 0.01)
-    moved, wider = extended(pos, scales, logs, K)
+    moved, wider = extend_surfaces(pos, scales, logs, K)
     changed = (moved != pos).any(-1)
     assert changed[0, :, 16].all() and int(changed.sum()) == 24
     torch.testing.assert_close(moved[0, 5, 16], torch.tensor([-5 * 4.0 / 40, 0.0, 0.0]))
@@ -37,7 +37,7 @@ def test_slopes_and_gaps_one_pixel_wide_stay():
 def test_one_pixel_and_no_jump():
     for logs in (torch.zeros(1, 1, 1), torch.zeros(2, 6, 5)):
         pos, scales = torch.rand(*logs.shape, 3), torch.rand(*logs.shape, 3)
-        moved, wider = extended(pos, scales, logs, K.expand(len(logs), 3, 3))
+        moved, wider = extend_surfaces(pos, scales, logs, K.expand(len(logs), 3, 3))
         assert torch.equal(moved, pos) and torch.equal(wider, scales)
 
 

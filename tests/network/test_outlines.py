@@ -7,7 +7,7 @@ from safetensors.torch import save_file
 from langflash_core.base.resources import weights_folder
 from langflash_core.errors import InputError, WeightsError
 from langflash_core.network.semantics.mobile_sam.model import MobileSam
-from langflash_core.network.semantics.outlines import FILES, Outlines, mobile_sam_checkpoint, outlined
+from langflash_core.network.semantics.outlines import FILES, Outlines, apply_outlines, mobile_sam_checkpoint
 from langflash_core.network.semantics.settings import OUTLINING
 from langflash_core.pipeline import reconstruct
 from tests.network.published import mobile_sam_name
@@ -39,7 +39,7 @@ def test_an_answer_that_means_the_same_redraws_its_group():
     """It moves the border to column 10; the other group says nothing and gives way."""
     logits = torch.zeros(2, 12, 16)
     logits[0] = torch.where(torch.arange(16) < 10, 20.0, -20.0)
-    redrawn = outlined(halves(), logits, torch.tensor([0.8, 0.0]))
+    redrawn = apply_outlines(halves(), logits, torch.tensor([0.8, 0.0]))
     assert (redrawn[0, :, :10] > 0.9).all() and (redrawn[1, :, 10:] > 0.9).all()
     assert torch.allclose(redrawn.sum(0), torch.ones(12, 16))
     expected = 0.3 * torch.tensor(OUTLINING.sure).exp()
@@ -48,7 +48,7 @@ def test_an_answer_that_means_the_same_redraws_its_group():
 
 def test_an_answer_that_means_another_thing_changes_nothing():
     logits = 9 * torch.randn(2, 12, 16, generator=torch.Generator().manual_seed(1))
-    assert torch.allclose(outlined(halves(), logits, torch.tensor([0.4, 0.0])), halves(), atol=1e-5)
+    assert torch.allclose(apply_outlines(halves(), logits, torch.tensor([0.4, 0.0])), halves(), atol=1e-5)
 
 
 def test_every_photo_is_asked_at_its_own_size(sam):
@@ -71,7 +71,7 @@ def test_groups_that_a_photo_hardly_shows_are_not_asked_for(sam):
 
 def test_weights_are_looked_for_by_name(sam, home):
     with pytest.raises(WeightsError, match=r"not at hand; put the authors' mobile_sam.pt"):
-        Outlines.installed("cpu")
+        Outlines.load_installed("cpu")
     encoder = "image_encoder."
     state = {
         encoder + mobile_sam_name(name.removeprefix(encoder)) if name.startswith(encoder) else name: value
@@ -80,7 +80,7 @@ def test_weights_are_looked_for_by_name(sam, home):
     weights_folder().mkdir(parents=True)
     save_file(state, weights_folder() / FILES[0])
     assert mobile_sam_checkpoint() == weights_folder() / FILES[0]
-    assert Outlines.installed("cpu", SIDE).model.side == SIDE
+    assert Outlines.load_installed("cpu", SIDE).model.side == SIDE
 
 
 def test_a_reconstruction_says_what_is_missing(home):

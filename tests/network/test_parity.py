@@ -8,7 +8,7 @@ from torch import Tensor
 
 from langflash_core.network import PointMapNet, build_network
 from langflash_core.network.checkpoints.importing import convert
-from langflash_core.network.points.heads import activated
+from langflash_core.network.points.heads import activate_gaussians
 from langflash_core.network.presets import PointMaps
 from tests.geometry.spread import covariances
 from tests.network import published
@@ -67,7 +67,7 @@ def test_gaussians_equal_the_published_ones(num_views, height, width, tmp_path):
     expected = published.noposplat(published.doubled(state), images.double() * 2 - 1, Ks.double(), TINY)
     tokens = network.encode(images[None], _in_pixels(Ks, height, width)[None])
     points = network.point_maps(tokens, images[None])[0]
-    gaussians = activated(network.raw_gaussians(tokens, images[None])[0], points)
+    gaussians = activate_gaussians(network.raw_gaussians(tokens, images[None])[0], points)
     shape = (num_views, height, width)
     found = {
         "means": gaussians.means.unflatten(0, shape),

@@ -26,7 +26,7 @@ def test_products_on_a_processor(monkeypatch, known, kind):
     monkeypatch.setattr(torch.cpu, "get_capabilities", lambda: known)
     monkeypatch.setattr(torch.backends.cpu, "get_cpu_capability", lambda: "AVX512")
     a = torch.ones(4, 4)
-    with precision.mixed("cpu"):
+    with precision.mixed_precision("cpu"):
         assert (a @ a).dtype is kind
     assert (a @ a).dtype is torch.float32
 
@@ -37,7 +37,7 @@ def test_a_processor_whose_units_are_hidden_keeps_float32_and_says_why(monkeypat
     monkeypatch.setattr(torch.cpu, "get_capabilities", lambda: {"amx_bf16": True})
     monkeypatch.setattr(torch.backends.cpu, "get_cpu_capability", lambda: told)
     a = torch.ones(4, 4)
-    with precision.mixed("cpu"):
+    with precision.mixed_precision("cpu"):
         assert (a @ a).dtype is torch.float32
     photos = [asset_path(f"photos/living_room_{side}.png") for side in ("left", "right")]
     with pytest.raises(InputError, match=r"ATEN_CPU_CAPABILITY.*--precision float32"):

@@ -9,10 +9,10 @@ from torch import nn
 from torch.nn import functional as F
 
 from langflash_core.network import MINI
-from langflash_core.network.checkpoints.files import completed, load_network
-from langflash_core.network.encoders.deeplab import framed
-from langflash_core.network.encoders.mosaic import enlarged
-from langflash_core.network.encoders.others import CHANNELS, SIDE, OtherEyes, seen
+from langflash_core.network.checkpoints.files import complete_tensors, load_network
+from langflash_core.network.encoders.deeplab import pad_frame
+from langflash_core.network.encoders.mosaic import enlarge
+from langflash_core.network.encoders.others import CHANNELS, SIDE, OtherEyes, resize_pictures
 from langflash_core.network.encoders.shared import Tokens
 from langflash_core.network.model import Seen
 from langflash_core.network.semantics.naming import describe, places
@@ -52,7 +52,7 @@ def test_a_layer_frames_what_it_reads_as_tensorflow_does(side, stride, dilation,
     torch.manual_seed(1)
     layer = nn.Conv2d(1, 1, side, stride, dilation=dilation).double()
     x = torch.randn(1, 1, *size, dtype=torch.float64)
-    found = layer(framed(x, layer))
+    found = layer(pad_frame(x, layer))
     assert found.shape[-2:] == tuple(-(-length // stride) for length in size)
     for row in range(found.shape[-2]):
         for column in range(found.shape[-1]):
@@ -64,9 +64,9 @@ def test_a_layer_frames_what_it_reads_as_tensorflow_does(side, stride, dilation,
 def test_they_see_pictures_of_any_shape_at_one_size(others, size):
     torch.manual_seed(2)
     picture = torch.rand(1, 3, *size)
-    assert max(seen(picture).shape[-2:]) == SIDE
+    assert max(resize_pictures(picture).shape[-2:]) == SIDE
     maps = others(picture)
-    height, width = (-(-length // 4) for length in seen(picture).shape[-2:])
+    height, width = (-(-length // 4) for length in resize_pictures(picture).shape[-2:])
     assert maps.shape == (1, CHANNELS, height, width) and bool(torch.isfinite(maps).all())
     assert float(maps.min()) >= 0
 
@@ -90,7 +90,7 @@ def test_single_precision_is_enough(others):
 def test_maps_are_enlarged_as_tensorflow_did_at_first(times, size):
     """Row r is read at r / times; behind the last one it goes on. Means of two halves round twice: 1e-12."""
     x = torch.randn(1, 2, 3, 3, dtype=torch.float64, generator=torch.Generator().manual_seed(8))
-    found = enlarged(x, times, size)
+    found = enlarge(x, times, size)
     assert found.shape[-2:] == size
     for row in range(size[0]):
         for column in range(size[1]):
@@ -197,11 +197,11 @@ def test_weights_from_before_them_say_nothing(network):
     old = {name: value for name, value in own.items() if name.split(".")[0] not in ("others", "second_head")}
     another = {"deeplab.stem.weight": torch.ones(1), "second_head.words.weight": torch.ones(384, 256)}
     for before in (old, old | another):
-        filled = completed(before)
+        filled = complete_tensors(before)
         assert filled.keys() == own.keys()
         assert {name: value.shape for name, value in filled.items()} == {k: v.shape for k, v in own.items()}
         new = filled.keys() - old.keys()
         assert new and not any(bool(filled[name].any()) for name in new)
-    assert completed(own) == own, "what is there stays"
+    assert complete_tensors(own) == own, "what is there stays"
     foreign = {"conv.weight": torch.ones(1)}
-    assert completed(foreign) == foreign
+    assert complete_tensors(foreign) == foreign

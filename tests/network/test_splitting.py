@@ -104,7 +104,7 @@ def test_few_directions_keep_the_cosines_of_a_scene():
     noise = 0.1 * mixed.norm(dim=-1, keepdim=True) / 384**0.5
     mixed = mixed + noise * torch.randn(mixed.shape, generator=generator)
     maps = torch.nn.functional.normalize(mixed, dim=-1).movedim(-1, 1)
-    small = splitting.condensed(maps)
+    small = splitting.condense_features(maps)
     assert small.shape == (2, 32, 6, 8)
     flat, thin = (m.movedim(1, -1).flatten(0, 2) for m in (maps, small))
     # What is lost is noise, a tenth of a vector: at most .1^2 of a cosine, and room for twice that.

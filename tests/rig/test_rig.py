@@ -58,7 +58,7 @@ def test_reprojection_is_that_of_a_loop(view, other):
         assert inside.any() and np.array_equal(found.inside, inside)
         pixels = np.where(inside, np.floor(y) * WIDTH + np.floor(x), 0).astype(int)
         assert np.array_equal(found.pixels, pixels)
-        across, down = found.scaled
+        across, down = found.normalised_coordinates
         assert np.allclose(across, x / WIDTH * 2 - 1) and np.allclose(down, y / HEIGHT * 2 - 1)
         theirs = rig.depths[other].flatten()
         assert torch.equal(found.looked_up(theirs), theirs[torch.from_numpy(pixels)])

@@ -46,7 +46,7 @@ def photographed(
     ratios = ratio if isinstance(ratio, tuple) else (ratio,) * num_views
     photos = []
     for view, camera in enumerate(whole):
-        finer = camera.resized(round(GRID[1] * ratios[view]), round(GRID[0] * ratios[view]))
+        finer = camera.with_size(round(GRID[1] * ratios[view]), round(GRID[0] * ratios[view]))
         photo = _colours(*_surface(finer, screen), busy) * (1.0 if gains is None else gains[view])
         photos.append((photo * 255).round() / 255)
     surfaces = [_surface(camera, screen) for camera in whole]

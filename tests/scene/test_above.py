@@ -9,7 +9,7 @@ import torch
 from langflash_core.base.records import World
 from langflash_core.geometry import rotations
 from langflash_core.scene.above import drawn_from_above, seen_from_above
-from langflash_core.scene.world import placed
+from langflash_core.scene.world import transform_scene
 from langflash_core.types import Scene
 from tests.app.window.scenes import room
 
@@ -37,10 +37,10 @@ def test_a_scene_that_is_turned_has_the_same_map() -> None:
     """The frame of a scene does not matter where its cameras are level, or where a world says what is up."""
     scene = walked()
     turn = rotations.matrix((0.8, 0.2, 0.4, np.sqrt(1 - 0.84)))
-    turned = placed(scene, turn, np.array([1.0, 2.0, 3.0]), 2.0)
+    turned = transform_scene(scene, turn, np.array([1.0, 2.0, 3.0]), 2.0)
     first, second = seen_from_above(scene), seen_from_above(turned)
     assert np.allclose(first.eyes, second.eyes, atol=1e-5) and np.allclose(first.ways, second.ways, atol=1e-5)
-    rolled = placed(scene, rotations.matrix((np.cos(0.3), 0.0, 0.0, np.sin(0.3))), np.zeros(3), 1.0)
+    rolled = transform_scene(scene, rotations.matrix((np.cos(0.3), 0.0, 0.0, np.sin(0.3))), np.zeros(3), 1.0)
     world = World((np.cos(0.3), 0.0, 0.0, -np.sin(0.3)), (0.0, 0.0, 0.0))
     third = seen_from_above(rolled.with_record(world=world))
     assert np.allclose(first.eyes, third.eyes, atol=1e-5)

@@ -13,12 +13,12 @@ from langflash_core.errors import InputError
 from langflash_core.geometry.harmonics import sh_to_colour
 from langflash_core.geometry.quaternions import multiply_quats, quats_to_matrices, unit_quats
 from langflash_core.scene import edits
-from langflash_core.scene.changed import changed, changed_scene, mean_luma
+from langflash_core.scene.changed import apply_changes, changed_scene, mean_luma
 from langflash_core.scene.changes import (
     Change,
     Moved,
     Recoloured,
-    checked,
+    parse_change,
     product,
     turn_about,
     turn_matrix,
@@ -28,7 +28,7 @@ from langflash_core.scene.edited import edited_scene, first_marks
 from langflash_core.scene.edits import History
 from langflash_core.scene.edits_file import load_history, save_history
 from langflash_core.scene.file import load, save
-from langflash_core.scene.joining import joined
+from langflash_core.scene.joining import join_scenes
 from langflash_core.scene.mask import Mask
 from langflash_core.splat import render
 from langflash_core.types import LUMA, NO_LANGUAGE, Gaussians, Scene
@@ -66,7 +66,7 @@ def test_a_move_is_a_similarity_of_means_covariances_and_colours() -> None:
     """Twin: Sigma' = s^2 R Sigma R^T and c'(R d) = c(d), one Gaussian after the other, float64."""
     before, rows = doubled(wide_cloud().gaussians), some_rows()
     move = a_move(rows)
-    after = changed(before, (move,))
+    after = apply_changes(before, (move,))
     R, pivot = turn_matrix(move.turn), np.array((0.3, -0.2, 2.0))
     sigma, moved = (covariances(g.quats, g.scales).numpy() for g in (before, after))
     directions = torch.nn.functional.normalize(torch.randn(COUNT, 3, dtype=torch.float64), dim=-1)
@@ -99,7 +99,7 @@ def test_turns_against_the_formulas_of_quaternions() -> None:
         quats = torch.tensor([one, two], dtype=torch.float64)
         np.testing.assert_allclose(turn_matrix(one), quats_to_matrices(quats)[0], atol=1e-12)
         np.testing.assert_allclose(product(one, two), multiply_quats(quats[0], quats[1]), atol=1e-12)
-        rough = checked("moved", some_rows(), [*(3.0 * quats[0]).tolist(), 1.0, 0.0, 0.0, 0.0])
+        rough = parse_change("moved", some_rows(), [*(3.0 * quats[0]).tolist(), 1.0, 0.0, 0.0, 0.0])
         assert isinstance(rough, Moved)
         np.testing.assert_allclose(rough.turn, one, atol=1e-12)
 
@@ -122,7 +122,7 @@ def test_what_the_camera_moves_along_with_looks_the_same() -> None:
     there = replace(look, viewmat=torch.from_numpy(turned), K=look.K.double())
     here = replace(look, viewmat=look.viewmat.double(), K=look.K.double())
     whole = replace(scene, gaussians=doubled(scene.gaussians))
-    moved = replace(whole, gaussians=changed(whole.gaussians, (move,)))
+    moved = replace(whole, gaussians=apply_changes(whole.gaussians, (move,)))
     pictures = [render(each, at, weight_maps=False).rgb for each, at in ((whole, here), (moved, there))]
     # 1e-6: the 0.01 near plane is not scaled, but nothing is that near; the rest is rounding
     torch.testing.assert_close(pictures[0], pictures[1], atol=1e-6, rtol=0)
@@ -130,7 +130,7 @@ def test_what_the_camera_moves_along_with_looks_the_same() -> None:
 
 def test_harmonics_of_degree_4_turn_up_to_degree_3_and_stay_elsewhere() -> None:
     gaussians, rows = wide_cloud(degree=4).gaussians, some_rows()
-    after = changed(gaussians, (a_move(rows),))
+    after = apply_changes(gaussians, (a_move(rows),))
     inside = torch.from_numpy(rows.rows())
     assert after.sh.shape == gaussians.sh.shape and bool((after.sh[inside][:, 16:] == 0).all())
     assert torch.equal(after.sh[~inside], gaussians.sh[~inside])
@@ -144,7 +144,7 @@ def test_a_tint_keeps_light_and_shade_and_has_its_colour_on_average() -> None:
     directions = torch.nn.functional.normalize(torch.randn(COUNT, 3, dtype=torch.float64), dim=-1)
     before = sh_to_colour(gaussians.sh, directions)
     for strength in (0.0, 0.4, 1.0):
-        after = changed(gaussians, (Recoloured.tinted(rows, wanted, strength, luma),))
+        after = apply_changes(gaussians, (Recoloured.tint(rows, wanted, strength, luma),))
         shade = (before @ torch.tensor(LUMA, dtype=torch.float64))[:, None] / luma
         mixed = (1 - strength) * before + strength * torch.tensor(wanted, dtype=torch.float64) * shade
         expected = torch.where(inside[:, None], mixed, before).clamp_min(0)
@@ -154,11 +154,11 @@ def test_a_tint_keeps_light_and_shade_and_has_its_colour_on_average() -> None:
 
 def test_two_changes_of_the_same_rows_are_one() -> None:
     gaussians, rows = doubled(wide_cloud().gaussians), some_rows()
-    tint = Recoloured.tinted(rows, (1.0, 0.2, 0.1), 0.6, 0.5)
+    tint = Recoloured.tint(rows, (1.0, 0.2, 0.1), 0.6, 0.5)
     for one, other in ((a_move(rows), Moved.about(rows, (1, 2, 3), turn_about((0, 1, 0), 40))), (tint, tint)):
         joined_up = with_change((one,), other)
         assert len(joined_up) == 1
-        apart, together = changed(gaussians, (one, other)), changed(gaussians, joined_up)
+        apart, together = apply_changes(gaussians, (one, other)), apply_changes(gaussians, joined_up)
         torch.testing.assert_close(together.means, apart.means, atol=1e-12, rtol=0)
         torch.testing.assert_close(together.sh, apart.sh, atol=1e-9, rtol=0)
         torch.testing.assert_close(
@@ -177,7 +177,7 @@ def edited(scene: Scene, *changes: Change) -> History:
 
 def test_changes_are_undone_exactly_saved_and_still_carry_their_groups(tmp_path: Path) -> None:
     scene, rows = wide_cloud(), some_rows()
-    move, tint = a_move(rows), Recoloured.tinted(some_rows(5), (0.9, 0.1, 0.1), 0.8, 0.4)
+    move, tint = a_move(rows), Recoloured.tint(some_rows(5), (0.9, 0.1, 0.1), 0.8, 0.4)
     history = edited(scene, move, tint, Moved(rows, offset=(0.5, 0.0, 0.0)))
     assert history.undo().undo().undo().marks == first_marks(scene)
     assert history.moved_to(1).moved_to(3).marks == history.marks
@@ -196,7 +196,7 @@ def test_two_scenes_become_one_whose_undoing_leaves_the_first(tmp_path: Path) ->
     second = wide_cloud(degree=2, seed=7, count=90).with_record(
         atom_names={0: "cat"}, silent_atoms=(2,), metric_scale=1.0
     )
-    whole = joined(first, second)
+    whole = join_scenes(first, second)
     atoms = first.semantics.num_atoms
     assert whole.record.atom_names == {1: "lamp", atoms: "cat"} and whole.record.silent_atoms == (atoms + 2,)
     theirs = whole.rows(torch.arange(COUNT, COUNT + 90))
@@ -236,16 +236,16 @@ def test_who_knows_no_level_is_coarse_and_sure_beside_who_does() -> None:
     plain, second = wide_cloud(), wide_cloud(seed=7, count=90)
     known = with_levels(second)
     assert known.levels is not None and known.confidences is not None
-    whole = joined(plain, known)
+    whole = join_scenes(plain, known)
     assert whole.levels is not None and whole.confidences is not None
     assert not bool(whole.levels[:COUNT].any()) and torch.equal(whole.levels[COUNT:], known.levels)
     assert bool((whole.confidences[:COUNT] == 1).all())
     assert torch.equal(whole.confidences[COUNT:], known.confidences)
-    other = joined(known, plain)
+    other = join_scenes(known, plain)
     assert other.levels is not None and torch.equal(other.levels[:90], known.levels)
     assert not bool(other.levels[90:].any())
-    assert joined(plain, second).levels is None and joined(plain, second).confidences is None
-    both = joined(known, with_levels(plain))
+    assert join_scenes(plain, second).levels is None and join_scenes(plain, second).confidences is None
+    both = join_scenes(known, with_levels(plain))
     assert both.levels is not None and int(both.levels.sum()) == 60 + COUNT - -(-COUNT // 3)
     # Undone, the first scene is what it was.
     undone = replace(first_marks(whole), there=(COUNT, plain.semantics.num_atoms))
@@ -269,10 +269,10 @@ def test_scenes_that_speak_differently_are_refused_and_mute_ones_taken(tmp_path:
     first, second = wide_cloud(), wide_cloud(seed=3)
     other = replace(second, semantics=replace(second.semantics, space="clip"))
     with pytest.raises(InputError, match=r"b\.langflash speaks clip and a speaks .*; merge scenes"):
-        joined(first, other, ("a", "b.langflash"))
+        join_scenes(first, other, ("a", "b.langflash"))
     empty = second.rows(torch.zeros(COUNT, dtype=torch.bool))
     with pytest.raises(InputError, match="holds no Gaussian"):
-        joined(first, empty)
+        join_scenes(first, empty)
     mute = replace(
         second,
         semantics=replace(
@@ -284,23 +284,23 @@ def test_scenes_that_speak_differently_are_refused_and_mute_ones_taken(tmp_path:
         ),
     )
     for one, two in ((first, mute), (mute, first)):
-        whole = joined(one, two)
+        whole = join_scenes(one, two)
         assert whole.semantics.space == first.semantics.space
         assert whole.semantics.num_atoms == first.semantics.num_atoms
         total = whole.semantics.weight_values.sum(1)
         silent = slice(COUNT, None) if two is mute else slice(0, COUNT)
         assert bool((total[silent] == 0).all())
-    undone = replace(first_marks(joined(mute, first)), there=(COUNT, 0))
-    save(edited_scene(joined(mute, first), undone), tmp_path / "mute.langflash")
+    undone = replace(first_marks(join_scenes(mute, first)), there=(COUNT, 0))
+    save(edited_scene(join_scenes(mute, first), undone), tmp_path / "mute.langflash")
     assert load(tmp_path / "mute.langflash").semantics.space == NO_LANGUAGE
 
 
 def test_a_history_forgets_its_oldest_steps_and_still_knows_what_was_opened(tmp_path: Path) -> None:
     scene = wide_cloud()
     history = edited(scene, *(Moved(some_rows(n), offset=(n + 1.0, 0.0, 0.0)) for n in range(6)))
-    short = history.bounded(most_edits=2)
+    short = history.drop_oldest(most_edits=2)
     assert (len(short.done), short.forgotten, short.marks) == (2, 4, history.marks)
     assert short.first == first_marks(scene) and short.moved_to(0).marks == history.moved_to(4).marks
-    assert len(history.bounded(most_bytes=1).done) == 1  # the last one can always be undone
+    assert len(history.drop_oldest(most_bytes=1).done) == 1  # the last one can always be undone
     save_history(short.undo(), scene, {}, tmp_path / "a.edits")
     assert load_history(tmp_path / "a.edits", scene) == short.undo()

@@ -35,7 +35,7 @@ from langflash_core.scene.edits import (
 )
 from langflash_core.scene.edits_file import load_history, read_about, save_history, scene_digest
 from langflash_core.scene.file import load, save
-from langflash_core.scene.joining import joined
+from langflash_core.scene.joining import join_scenes
 from langflash_core.scene.tour import Note, Stop, Tour, told_tour
 from langflash_core.splat import render
 from langflash_core.types import Scene
@@ -48,7 +48,7 @@ COUNT, ATOMS = 1003, 9  # not a multiple of 8
 def random_history(seed: int, steps: int) -> tuple[History, list[Marks]]:
     """A history of random edits of every kind, with the marks after each."""
     generator = np.random.default_rng(seed)
-    history = History(Marks.untouched(COUNT, ATOMS))
+    history = History(Marks.without_edits(COUNT, ATOMS))
     passed = [history.marks]
     while len(history.done) < steps:
         marks = history.marks
@@ -105,19 +105,25 @@ def test_200_random_edits_undone_give_the_first_state_bit_for_bit(seed):
 
 
 def test_a_new_edit_forgets_what_was_undone_and_no_change_is_no_edit():
-    history = History(Marks.untouched(16, 0)).edited("all", select(Marks.untouched(16, 0), Mask.full(16)))
+    history = History(Marks.without_edits(16, 0)).edited(
+        "all", select(Marks.without_edits(16, 0), Mask.full(16))
+    )
     assert history.edited("again", history.marks) is history
     undone = history.undo()
     assert undone.undone and undone.edited("hide", hide(undone.marks, Mask.full(16))).undone == ()
 
 
 def test_an_edit_of_another_scene_is_refused():
-    edit = History(Marks.untouched(16, 2)).edited("x", invert(Marks.untouched(16, 2))).done[0]
+    edit = History(Marks.without_edits(16, 2)).edited("x", invert(Marks.without_edits(16, 2))).done[0]
     with pytest.raises(ValueError, match="rows"):
-        edit.apply(Marks.untouched(800, 2))
-    rename = History(Marks.untouched(8, 2)).edited("x", rename_atom(Marks.untouched(8, 2), 1, "sofa")).done[0]
+        edit.apply(Marks.without_edits(800, 2))
+    rename = (
+        History(Marks.without_edits(8, 2))
+        .edited("x", rename_atom(Marks.without_edits(8, 2), 1, "sofa"))
+        .done[0]
+    )
     with pytest.raises(ValueError, match="atom 1"):
-        rename.apply(Marks.untouched(8, 1))
+        rename.apply(Marks.without_edits(8, 1))
 
 
 # The scene that edits describe
@@ -285,7 +291,7 @@ def test_kept_edits_of_each_version_open_with_all_they_say(version):
     want = replace(deny_atom(want, 0, "wall"), metric_scale=1.25)
     if version >= 2:
         want = change(want, Moved(rows[1], offset=(0.25, 0.0, -0.5)))
-        want = change(want, Recoloured.tinted(rows[2], (0.5, 0.25, 1.0), 0.5, 0.5))
+        want = change(want, Recoloured.tint(rows[2], (0.5, 0.25, 1.0), 0.5, 0.5))
     if version >= 3:
         stop = Stop("The wall", Pose(Vector(0.0, 0.0, -1.0)), "look")
         tour = Tour((stop,), (Note("A note", Vector(0.0, 0.0, 1.0)),))
@@ -341,12 +347,12 @@ def test_a_damaged_history_is_refused(scene, tmp_path: Path, spoil):
 def test_what_a_merge_brought_is_saved_in_every_layer(tmp_path: Path):
     first = layered([(2, 0.2, 0), (2, 0.8, 1)], [0.0, 0.5])
     second = first.rows(torch.arange(20)).with_record(layered=False)
-    whole = joined(first, second)
+    whole = join_scenes(first, second)
     saved = edited_scene(whole, first_marks(whole))
     save(saved, tmp_path / "saved.langflash")
     again = load(tmp_path / "saved.langflash")
     assert again.layered and len(again.layer(0).gaussians) == len(first.layer(0).gaussians) + 20
     with pytest.raises(ValueError, match="without layers"):
-        joined(second, first)
-    plain = joined(first.with_record(layered=False), second)
+        join_scenes(second, first)
+    plain = join_scenes(first.with_record(layered=False), second)
     assert edited_scene(plain, first_marks(plain)).view_ids is None

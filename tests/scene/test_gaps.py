@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 import torch
 
-from langflash_core.scene.gaps import filled, num_levels, pulled, pushed
+from langflash_core.scene.gaps import fill_gaps, num_levels, pull_level, push_level
 
 
 def picture(height: int, width: int) -> tuple[torch.Tensor, torch.Tensor]:
@@ -52,20 +52,22 @@ def test_it_is_pull_and_push(size) -> None:
     rgb, alphas = picture(*size)
     expected = plain_filled(rgb.numpy(), alphas.numpy(), num_levels(size[1], size[0]))
     # Sums of the same numbers in another order.
-    torch.testing.assert_close(filled(rgb, alphas), torch.from_numpy(expected[..., :3]), rtol=0, atol=1e-14)
-    single = filled(rgb.float(), alphas.float()).double()
+    torch.testing.assert_close(
+        fill_gaps(rgb, alphas), torch.from_numpy(expected[..., :3]), rtol=0, atol=1e-14
+    )
+    single = fill_gaps(rgb.float(), alphas.float()).double()
     torch.testing.assert_close(single, torch.from_numpy(expected[..., :3]), rtol=0, atol=2e-6)
 
 
 def test_what_is_covered_stays() -> None:
     rgb, _ = picture(40, 60)
-    assert torch.equal(filled(rgb, torch.ones(40, 60, dtype=torch.float64)), rgb)
+    assert torch.equal(fill_gaps(rgb, torch.ones(40, 60, dtype=torch.float64)), rgb)
 
 
 def test_a_crack_takes_the_colours_beside_it() -> None:
     rgb, alphas = torch.full((64, 64, 3), 0.5), torch.ones(64, 64)
     rgb[:, 30:32], alphas[:, 30:32] = 0, 0
-    whole = filled(rgb, alphas)
+    whole = fill_gaps(rgb, alphas)
     # Two pixels wide and aligned with the coarser picture: half of it comes from there, so from both sides.
     assert (whole[:, 30:32] > 0.49).all() and (whole <= 0.5 + 1e-6).all()
 
@@ -73,16 +75,16 @@ def test_a_crack_takes_the_colours_beside_it() -> None:
 def test_far_from_everything_nothing_is_invented() -> None:
     rgb, alphas = torch.zeros(256, 256, 3), torch.zeros(256, 256)
     rgb[:, :16], alphas[:, :16] = 1, 1
-    whole = filled(rgb, alphas)
+    whole = fill_gaps(rgb, alphas)
     assert whole[:, 16:24].min() > 0.5  # beside what is drawn
     assert whole[:, 128:].max() == 0  # more than three times the reach away
 
 
 def test_an_empty_picture_stays_empty() -> None:
-    assert not filled(torch.zeros(20, 30, 3), torch.zeros(20, 30)).any()
-    assert (filled(torch.zeros(20, 30, 3), torch.zeros(20, 30), 0.25) == 0.25).all()
+    assert not fill_gaps(torch.zeros(20, 30, 3), torch.zeros(20, 30)).any()
+    assert (fill_gaps(torch.zeros(20, 30, 3), torch.zeros(20, 30), 0.25) == 0.25).all()
 
 
 def test_the_passes_keep_their_sizes() -> None:
     fine = torch.rand(7, 9, 4)
-    assert pulled(fine).shape == (4, 5, 4) and pushed(fine, pulled(fine)).shape == (7, 9, 4)
+    assert pull_level(fine).shape == (4, 5, 4) and push_level(fine, pull_level(fine)).shape == (7, 9, 4)

@@ -14,7 +14,7 @@ from langflash_core.scene import lone
 from langflash_core.scene.edited import there
 from langflash_core.scene.edits import Marks, allow_atom, deny_atom
 from langflash_core.scene.file import load, save
-from langflash_core.scene.joining import joined
+from langflash_core.scene.joining import join_scenes
 from langflash_core.scene.lone import mean_meaning, with_lone_part
 from langflash_core.scene.thin import covered_areas
 from langflash_core.types import Scene
@@ -56,7 +56,7 @@ def test_copies_carry_the_new_atom_and_nothing_else_changes(room: Scene, part: t
     assert (whole.semantics.weight_ids[count:, 0] == atoms).all()
     assert (whole.semantics.weight_values[count:].sum(1) == 1).all()
     assert whole.record.lone_atoms == (atoms,)
-    back = there(whole, Marks.untouched(count, atoms))
+    back = there(whole, Marks.without_edits(count, atoms))
     assert back.record.lone_atoms == () and torch.equal(back.semantics.dictionary, room.semantics.dictionary)
     assert torch.equal(back.gaussians.means, room.gaussians.means)
 
@@ -65,8 +65,8 @@ def test_files_and_merges_keep_which_atoms_are_lone(room: Scene, part: torch.Ten
     whole, atoms = with_lone_part(room, part), room.semantics.num_atoms
     save(whole, tmp_path / "s.langflash")
     assert load(tmp_path / "s.langflash").record.lone_atoms == (atoms,)
-    assert joined(room, whole).record.lone_atoms == (2 * atoms,)
-    assert joined(whole, room).record.lone_atoms == (atoms,)
+    assert join_scenes(room, whole).record.lone_atoms == (2 * atoms,)
+    assert join_scenes(whole, room).record.lone_atoms == (atoms,)
 
 
 def test_what_a_lone_atom_is_denied_is_denied_to_no_other(room: Scene) -> None:
@@ -85,7 +85,7 @@ def test_what_a_lone_atom_is_denied_is_denied_to_no_other(room: Scene) -> None:
 
 
 def test_a_denial_is_taken_back(room: Scene) -> None:
-    marks = Marks.untouched(3, 2)
+    marks = Marks.without_edits(3, 2)
     denied = deny_atom(marks, 1, "chair")
     assert allow_atom(denied, 1, "chair") == marks and allow_atom(denied, 1, "sofa") == denied
 

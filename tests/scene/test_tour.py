@@ -25,7 +25,7 @@ from langflash_core.scene.edits_file import load_history, save_history
 from langflash_core.scene.file import load, save
 from langflash_core.scene.report import describe_file
 from langflash_core.scene.settings import TOURS
-from langflash_core.scene.tour import NO_TOUR, Note, Stop, Tour, checked, read_tour, told_tour
+from langflash_core.scene.tour import NO_TOUR, Note, Stop, Tour, check_tour, read_tour, told_tour
 from langflash_core.showing.tours import pose_of_view, stop_at, tour_in, write_tour
 from tests.app.cli.conftest import stripes
 
@@ -65,7 +65,7 @@ def test_stops_move_are_renamed_and_go_and_the_start_stays_true():
         (lambda: TOUR.with_note(Note("x" * 401, Vector(0, 0, 1))), "at most 400"),
         (lambda: TOUR.started("Cellar"), "no stop called Cellar"),
         (
-            lambda: checked(Tour(tuple(Stop(str(n), A) for n in range(TOURS.most_stops + 1)))),
+            lambda: check_tour(Tour(tuple(Stop(str(n), A) for n in range(TOURS.most_stops + 1)))),
             "at most 100 stops",
         ),
         (lambda: stop_at(TOUR, "3"), "no stop 3"),

@@ -10,7 +10,7 @@ import torch
 from langflash_core.errors import InputError
 from langflash_core.geometry.cameras import invert_rigid
 from langflash_core.scene.settings import TRUST
-from langflash_core.scene.trust import faded, trust
+from langflash_core.scene.trust import fade_untrusted, trust
 from langflash_core.splat import render
 from langflash_core.types import Camera, Scene
 from tests.splat.scenes import cloud
@@ -52,7 +52,7 @@ def test_trust_falls_with_the_angle_to_the_nearest_photo():
 @pytest.mark.parametrize("view", [0, 1])
 def test_from_a_photos_own_place_a_frame_is_equal_bit_by_bit(scene: Scene, view: int):
     frame = render(scene, scene.camera(view))
-    same = faded(frame, scene.camera(view), scene)
+    same = fade_untrusted(frame, scene.camera(view), scene)
     for name in ("rgb", "alphas", "depths", "weight_maps"):
         assert torch.equal(getattr(same, name), getattr(frame, name))
 
@@ -65,7 +65,7 @@ def test_far_aside_a_frame_is_empty(scene: Scene):
     pose[:3, 3] = middle + torch.tensor([6.0, 0, 0])
     camera = Camera(invert_rigid(pose), own.K, own.width, own.height)
     frame = render(scene, camera)
-    gone = faded(frame, camera, scene)
+    gone = fade_untrusted(frame, camera, scene)
     assert frame.alphas.max() > 0.5
     assert gone.alphas.sum() < 0.1 * frame.alphas.sum()
     for values in (gone.rgb, gone.alphas, gone.depths, gone.weight_maps):
@@ -75,4 +75,4 @@ def test_far_aside_a_frame_is_empty(scene: Scene):
 def test_nobody_knows_the_photos_of_a_splat_file(scene: Scene):
     frame = render(scene, scene.camera(0))
     with pytest.raises(InputError, match="leave --fade out"):
-        faded(frame, scene.camera(0), replace(scene, view_ids=None))
+        fade_untrusted(frame, scene.camera(0), replace(scene, view_ids=None))

@@ -12,7 +12,7 @@ from langflash_core.geometry.rotations import matrix
 from langflash_core.scene.bare import bare_scene
 from langflash_core.scene.checks import check_scene
 from langflash_core.scene.tour import read_tour, told_tour
-from langflash_core.scene.world import in_world, placed
+from langflash_core.scene.world import in_world, transform_scene
 from langflash_core.splat import render
 from tests.export.splats import random_gaussians
 from tests.scene.test_tour import TOUR
@@ -56,7 +56,7 @@ def test_a_scene_that_is_placed_shows_its_views_the_same():
     ).with_record(camera_path=(key, {"centre": "nowhere"}))  # fmt: skip
     turn = quats_to_matrices(torch.tensor([0.8, 0.3, -0.4, 0.3], dtype=torch.float64)).numpy()
     origin = np.array([0.5, -1.0, 2.0])
-    moved = placed(scene, turn, origin, 2.5)
+    moved = transform_scene(scene, turn, origin, 2.5)
     check_scene(moved)
     for view in range(2):
         before, after = render(scene, scene.camera(view)), render(moved, moved.camera(view))
@@ -67,7 +67,7 @@ def test_a_scene_that_is_placed_shows_its_views_the_same():
     assert np.allclose(matrix(tuple(first["rotation"])), turn, atol=1e-9)
     assert first["reach"] == 5.0 and first["fov"] == 60.0 and odd == {"centre": "nowhere"}
     assert moved.record.tour == {}
-    back = placed(moved, turn.T, -2.5 * turn @ origin, 1 / 2.5)
+    back = transform_scene(moved, turn.T, -2.5 * turn @ origin, 1 / 2.5)
     assert torch.allclose(back.gaussians.means, scene.gaussians.means, atol=1e-5)
     assert torch.allclose(back.viewmats, scene.viewmats, atol=1e-5)
 
@@ -76,7 +76,7 @@ def test_stops_and_notes_stay_at_their_things():
     scene = bare_scene(random_gaussians(3), "made").with_record(tour=told_tour(TOUR))
     turn = quats_to_matrices(torch.tensor([0.8, 0.3, -0.4, 0.3], dtype=torch.float64)).numpy()
     origin = np.array([0.5, -1.0, 2.0])
-    moved = read_tour(placed(scene, turn, origin, 2.5).record.tour)
+    moved = read_tour(transform_scene(scene, turn, origin, 2.5).record.tour)
     assert moved.names == TOUR.names and moved.start == TOUR.start
     for old, new in zip(TOUR.notes, moved.notes, strict=True):
         assert np.allclose(new.at, 2.5 * turn @ (np.array(old.at) - origin))

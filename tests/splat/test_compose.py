@@ -89,21 +89,21 @@ def test_half_way_between_two_photos_agreeing_layers_are_blended_alike():
 
 def test_the_best_supported_depth_shows_and_no_second_one():
     frames = [frame(0.2, 1, 2.0), frame(0.2, 1, 2.02), frame(0.9, 1, 1.0)]
-    blend = compose.blended(frames, np.full(3, 1 / 3))
+    blend = compose.blend_layers(frames, np.full(3, 1 / 3))
     # support of the third is 1 beside 2: (1 / 2)^4 of the weight of either other one
     expected = (2 * 0.2 + 0.9 / 16) / (2 + 1 / 16)
     assert torch.allclose(blend.rgb, torch.full_like(blend.rgb, expected), atol=0.005)
 
 
 def test_a_hole_is_filled_by_the_next_layer():
-    blend = compose.blended([frame(0.2, 0, 0), frame(0.9, 1, 3)], np.array([0.9, 0.1]))
+    blend = compose.blend_layers([frame(0.2, 0, 0), frame(0.9, 1, 3)], np.array([0.9, 0.1]))
     assert torch.allclose(blend.rgb, torch.full_like(blend.rgb, 0.9)) and torch.allclose(
         blend.depths, torch.full_like(blend.depths, 3.0)
     )
 
 
 def test_where_no_layer_shows_anything_nothing_is_shown():
-    blend = compose.blended([frame(0.2, 0, 0), frame(0.9, 0, 0)], np.array([0.5, 0.5]))
+    blend = compose.blend_layers([frame(0.2, 0, 0), frame(0.9, 0, 0)], np.array([0.5, 0.5]))
     assert not blend.rgb.any() and not blend.alphas.any() and not blend.depths.any()
 
 

@@ -5,14 +5,14 @@ import numpy as np
 import torch
 from torch import Tensor
 
-from langflash_core.surface.borders import BorderRule, quieted
+from langflash_core.surface.borders import BorderRule, denoise
 
 
 def plain_smoothed(weights: np.ndarray, image: np.ndarray, rule: BorderRule) -> np.ndarray:
     """Weights (K, H, W) >= 0 after the rounds of rows and columns; image (3, H, W)."""
     values = weights.astype(np.float64)
     values = values**rule.sharpness / (values**rule.sharpness).sum(0)
-    picture = quieted(image, rule.noise).astype(np.float64)
+    picture = denoise(image, rule.noise).astype(np.float64)
     _, height, width = picture.shape
     down = np.linalg.norm(picture[:, 1:] - picture[:, :-1], axis=0)
     across = np.linalg.norm(picture[:, :, 1:] - picture[:, :, :-1], axis=0)

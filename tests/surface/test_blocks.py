@@ -7,7 +7,16 @@ import pytest
 import torch
 from torch import Tensor
 
-from langflash_core.surface.blocks import LARGEST, LEVELS, Squares, Tree, grown, leaves, padded, threshold
+from langflash_core.surface.blocks import (
+    LARGEST,
+    LEVELS,
+    Squares,
+    Tree,
+    grow_tree,
+    leaves,
+    pad_to_blocks,
+    threshold,
+)
 from langflash_core.surface.clearance import clearances
 from langflash_core.surface.settings import UPSAMPLING
 
@@ -67,7 +76,7 @@ def masks(height: int, width: int, seed: int) -> Tensor:
 @pytest.mark.parametrize("limit", [EVERYTHING, LEAST, 0.02, torch.inf])
 def test_the_squares_tile_the_photo(size, limit):
     photo = noise(*size)
-    found, _ = leaves(grown(photo, flat(photo), endless(photo), all_wanted(photo)), limit)
+    found, _ = leaves(grow_tree(photo, flat(photo), endless(photo), all_wanted(photo)), limit)
     assert [squares.side for squares in found] == [1, 2, 4, 8, 16]
     assert torch.equal(covered(found, size), torch.ones(size, dtype=torch.int64))
     for squares in found:  # each on the grid of its own size
@@ -79,10 +88,10 @@ def test_the_squares_tile_the_photo(size, limit):
 def test_what_is_wanted_is_covered_once_and_of_the_rest_only_what_shares_a_square_of_four(seed, limit):
     size = (59, 70)
     photo, wanted = noise(*size, seed), masks(*size, seed)
-    found, _ = leaves(grown(photo, flat(photo), endless(photo), wanted), limit)
+    found, _ = leaves(grow_tree(photo, flat(photo), endless(photo), wanted), limit)
     counts = covered(found, size)
     assert (counts[wanted] == 1).all() and int(counts.max()) == 1
-    fours = torch.nn.functional.max_pool2d(padded(wanted[None].float()), 4)[0]
+    fours = torch.nn.functional.max_pool2d(pad_to_blocks(wanted[None].float()), 4)[0]
     shared = fours.repeat_interleave(4, 0).repeat_interleave(4, 1)[: size[0], : size[1]] > 0
     assert not (counts[~shared]).any()
     for squares in found[3:]:
@@ -92,7 +101,7 @@ def test_what_is_wanted_is_covered_once_and_of_the_rest_only_what_shares_a_squar
 
 def test_nobody_wants_anything():
     photo = noise(40, 40)
-    tree = grown(photo, flat(photo), endless(photo), torch.zeros(40, 40, dtype=torch.bool))
+    tree = grow_tree(photo, flat(photo), endless(photo), torch.zeros(40, 40, dtype=torch.bool))
     found, beneath = leaves(tree, EVERYTHING)
     assert count(found) == 0 and len(beneath) == 0
     assert threshold([tree], 100, LEAST) == LEAST
@@ -103,7 +112,7 @@ def test_what_is_plain_and_flat_is_covered_by_the_largest(colour):
     """Colours of one value, on a wall that is slanted by a thousandth a pixel."""
     photo = torch.full((3, 48, 64), colour)
     depths = 1 + 0.001 * torch.arange(64).expand(48, 64)
-    found, beneath = leaves(grown(photo, depths, endless(photo), all_wanted(photo)), LEAST)
+    found, beneath = leaves(grow_tree(photo, depths, endless(photo), all_wanted(photo)), LEAST)
     assert [len(squares) for squares in found] == [0, 0, 0, 0, 12] and len(beneath) == 0
 
 
@@ -112,7 +121,7 @@ def test_a_photo_below_the_noise_of_its_numbers_is_not_parted():
     256 steps^2 / 12, of which a parting brings back a share."""
     generator = torch.Generator().manual_seed(0)
     photo = 0.7 + (torch.rand(3, 64, 64, generator=generator) - 0.5) * 1e-4
-    found, _ = leaves(grown(photo, flat(photo), endless(photo), all_wanted(photo)), LEAST)
+    found, _ = leaves(grow_tree(photo, flat(photo), endless(photo), all_wanted(photo)), LEAST)
     assert count(found) == len(found[-1]) == 16
 
 
@@ -120,7 +129,7 @@ def test_the_budget_is_kept_and_more_buys_more():
     """A parting adds three or four, so up to three are left over, and squares that are parted for the
     sake of one inside gain the same, up to `LEVELS` of them: all or none."""
     trees = [
-        grown(photo, flat(photo), endless(photo), all_wanted(photo))
+        grow_tree(photo, flat(photo), endless(photo), all_wanted(photo))
         for photo in (noise(64, 64, 1), noise(64, 64, 2))
     ]
     everything = 2 * (64 * 64 + 16 * 16)
@@ -139,7 +148,7 @@ def test_partings_that_must_be_come_out_of_the_budget_and_on_top_where_it_is_too
     photo = noise(64, 64)
     depths = torch.zeros(64, 64)
     depths[:, 33:] = 1
-    tree = grown(photo, depths, endless(photo), all_wanted(photo))
+    tree = grow_tree(photo, depths, endless(photo), all_wanted(photo))
     forced = counted(tree, torch.inf)
     # Along the edge four squares of each size from 16 on: 4 of 16, 8 of 8, 16 of 4, 32 of 2 are parted,
     # and 16 lie beneath.
@@ -156,7 +165,7 @@ def test_squares_end_at_a_jump_of_depth_as_small_as_pixels(upright):
     depths[:, 21:] = 2 * UPSAMPLING.jump
     if not upright:
         depths = depths.T.contiguous()
-    found, beneath = leaves(grown(photo, depths, endless(photo), all_wanted(photo)), torch.inf)
+    found, beneath = leaves(grow_tree(photo, depths, endless(photo), all_wanted(photo)), torch.inf)
     across = [squares.left if upright else squares.top for squares in found]
     assert set(across[0].tolist()) == {20, 21} and len(found[0]) == 96
     for lefts, squares in zip(across, found, strict=True):  # none on both sides
@@ -169,14 +178,14 @@ def test_a_jump_between_squares_parts_none():
     photo = torch.full((3, 48, 48), 0.5)
     depths = torch.zeros(48, 48)
     depths[:, 16:] = 1
-    assert count(leaves(grown(photo, depths, endless(photo), all_wanted(photo)), torch.inf)[0]) == 9
+    assert count(leaves(grow_tree(photo, depths, endless(photo), all_wanted(photo)), torch.inf)[0]) == 9
 
 
 def test_a_bend_parts_what_it_would_cut_off():
     """A corner of a room: the ridge is .05 of log depth before the mean of a largest square's corners."""
     photo = torch.full((3, 48, 48), 0.5)
     depths = 0.006 * (torch.arange(48) - 23.5).abs().expand(48, 48)
-    found, _ = leaves(grown(photo, depths, endless(photo), all_wanted(photo)), torch.inf)
+    found, _ = leaves(grow_tree(photo, depths, endless(photo), all_wanted(photo)), torch.inf)
     on = covered(found[4:], (48, 48)) > 0
     assert not on[:, 16:32].any() and on[:, :16].all() and on[:, 32:].all()
 
@@ -187,7 +196,7 @@ def test_towards_the_end_of_a_surface_squares_grow_smaller_and_behind_it_they_st
     photo = torch.full((3, 64, 80), 0.5)
     depths = torch.zeros(64, 80)
     depths[:, 40:] = 1
-    found, _ = leaves(grown(photo, depths, clearances(depths), all_wanted(photo)), torch.inf)
+    found, _ = leaves(grow_tree(photo, depths, clearances(depths), all_wanted(photo)), torch.inf)
     assert torch.equal(covered(found, (64, 80)), torch.ones(64, 80, dtype=torch.int64))
     for squares, least in zip(found, (0, 1, 4.8, 9.6, 19.2), strict=True):
         nearer = squares.left[squares.left < 40]
@@ -200,7 +209,7 @@ def test_nothing_is_finer_than_the_finest(finest):
     photo = torch.rand(3, 45, 61, generator=torch.Generator().manual_seed(0))
     depths = torch.zeros(45, 61)
     depths[:, 30:] = 1
-    found, beneath = leaves(grown(photo, depths, endless(photo), all_wanted(photo), finest), LEAST)
+    found, beneath = leaves(grow_tree(photo, depths, endless(photo), all_wanted(photo), finest), LEAST)
     assert not any(len(squares) for squares in found if squares.side < finest)
     assert any(len(squares) for squares in found if squares.side == finest)
     assert torch.equal(covered(found, (45, 61)), torch.ones(45, 61, dtype=torch.int64))
@@ -210,7 +219,7 @@ def test_nothing_is_finer_than_the_finest(finest):
 @pytest.mark.parametrize("limit", [LEAST, 0.05, torch.inf])
 def test_beneath_are_those_of_four_that_were_parted(limit):
     photo = noise(45, 61)
-    found, beneath = leaves(grown(photo, flat(photo), endless(photo), all_wanted(photo)), limit)
+    found, beneath = leaves(grow_tree(photo, flat(photo), endless(photo), all_wanted(photo)), limit)
     assert torch.equal(covered(found[:2], (45, 61)), covered([beneath], (45, 61)))
 
 
@@ -282,7 +291,7 @@ def test_the_tree_agrees_with_recursion(finest, limit, ends):
     photo, wanted = noise(*size, 3), masks(*size, 5)
     depths = torch.where(torch.arange(43) > 27, 0.5, 0.002 * torch.arange(30.0)[:, None] ** 1.5)
     clear = clearances(depths) if ends else endless(photo)
-    found, _ = leaves(grown(photo, depths, clear, wanted, finest), float(limit))
+    found, _ = leaves(grow_tree(photo, depths, clear, wanted, finest), float(limit))
     plain = Plain.of(photo, depths, clear, wanted, finest)
     expected = [
         leaf

@@ -7,7 +7,7 @@ import torch
 
 from langflash_core.geometry.cameras import invert_rigid, transform, unproject
 from langflash_core.rig.rig import Rig
-from langflash_core.surface.consistency import outvoted, seen_through
+from langflash_core.surface.consistency import outvoted_pixels, seen_through
 from langflash_core.surface.settings import CONSISTENCY
 from tests.geometry.twins import seen_at
 
@@ -95,10 +95,10 @@ def test_several_views_equal_their_twin():
 
 
 def _three_views(depths: torch.Tensor) -> torch.Tensor:
-    """`outvoted` of three cameras side by side with these depths (3, 24, 32)."""
+    """`outvoted_pixels` of three cameras side by side with these depths (3, 24, 32)."""
     viewmats = torch.eye(4).repeat(3, 1, 1)
     viewmats[1, 0, 3], viewmats[2, 0, 3] = -0.2, 0.2
-    return outvoted(Rig(viewmats, K.expand(3, 3, 3), depths))
+    return outvoted_pixels(Rig(viewmats, K.expand(3, 3, 3), depths))
 
 
 def test_a_skirt_that_two_others_see_through_goes():
@@ -128,4 +128,4 @@ def test_far_from_jumps_nothing_is_outvoted():
 def test_two_photos_cannot_outvote():
     depths = torch.full((2, 24, 32), 2.0)
     depths[0, :, 15:17] = 1.5
-    assert not outvoted(Rig(torch.eye(4).repeat(2, 1, 1), K.expand(2, 3, 3), depths)).any()
+    assert not outvoted_pixels(Rig(torch.eye(4).repeat(2, 1, 1), K.expand(2, 3, 3), depths)).any()

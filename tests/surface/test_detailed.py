@@ -11,7 +11,7 @@ from langflash_core.errors import InputError
 from langflash_core.scene.checks import check_scene
 from langflash_core.splat.reference import render
 from langflash_core.surface.detailed import (
-    _spent,
+    _spending_record,
     assemble_detailed,
     working_photo,
     working_size,
@@ -89,7 +89,7 @@ def test_what_goes_on_under_others_is_no_square_of_a_size():
     """Of seven cells of 16 / 7 pixels each it is 16 pixels wide, as the largest squares are."""
     behind = under(torch.ones(7, 7).triu().log1p(), torch.rand(3, 7, 7), (16, 16))
     assert len(behind) and torch.allclose(behind.sides, torch.tensor(16.0))
-    assert not any(_spent(behind, NORMAL, 1, (16, 16))["by_size"].values())
+    assert not any(_spending_record(behind, NORMAL, 1, (16, 16))["by_size"].values())
 
 
 def test_a_wall_alone_needs_nothing_behind_it():
@@ -142,7 +142,7 @@ def test_the_coarse_level_alone_is_closed(scene, eye):
     assert unit is not None and scene.levels is not None
     viewmat = torch.eye(4)
     viewmat[:3, 3] = -torch.tensor(eye) / unit
-    camera = Camera(viewmat, scene.Ks[0], GRID[1], GRID[0]).resized(120, 90)
+    camera = Camera(viewmat, scene.Ks[0], GRID[1], GRID[0]).with_size(120, 90)
     coarsest = scene.rows(scene.levels == 0)
     whole, coarse = (render(s, camera, weight_maps=False).alphas[1:-1, 1:-1] for s in (scene, coarsest))
     assert float((whole >= 0.97).float().mean()) > 0.75

@@ -19,13 +19,13 @@ from langflash_core.surface.elements import (
     Elements,
     drawn_in,
     ground,
-    joined,
+    join_elements,
     of_squares,
-    placed,
+    place_elements,
     under,
 )
 from langflash_core.surface.settings import COVERING, UPSAMPLING
-from langflash_core.surface.upsampling import Upsampled, upsampled
+from langflash_core.surface.upsampling import Upsampled, upsample_depths
 from langflash_core.types import Camera, Gaussians
 
 FLOAT32 = 2e-5  # relative: some hundred float32 roundings at most
@@ -54,7 +54,7 @@ class Sight:
         log_depths = (2 * facing[2] / (rays(K, grid[1], grid[0]) @ facing)).log()
         size = (round(grid[0] * ratio), round(grid[1] * ratio))
         photo = torch.rand(3, *size, generator=torch.Generator().manual_seed(0))
-        depth = upsampled(log_depths, torch.ones(3, *grid), photo)
+        depth = upsample_depths(log_depths, torch.ones(3, *grid), photo)
         camera = Camera(torch.eye(4) if viewmat is None else viewmat, K, grid[1], grid[0])
         return Sight(camera, log_depths, photo, depth)
 
@@ -63,14 +63,14 @@ class Sight:
         return self.photo.shape[-2], self.photo.shape[-1]
 
     def gaussians(self, elements: Elements) -> Gaussians:
-        return placed(elements, self.log_depths, self.depth.slopes, self.camera, self.size)
+        return place_elements(elements, self.log_depths, self.depth.slopes, self.camera, self.size)
 
     def coarse(self, side: int) -> Elements:
         return of_squares(squares(side, self.size), self.photo, self.depth)
 
     def fine(self, side: int) -> Elements:
         """On their ground."""
-        return joined([self.coarse(side), self.ground()])
+        return join_elements([self.coarse(side), self.ground()])
 
     def ground(self) -> Elements:
         return ground(squares(4, self.size), self.photo, self.depth)
@@ -84,7 +84,7 @@ def squares(side: int, size: tuple[int, int]) -> Squares:
 
 def window(sight: Sight, zoom: int, left: int, top: int, pixels: int) -> Camera:
     """The sight's camera at `zoom` times the photo's size, of which some pixels of the photo are drawn."""
-    whole = sight.camera.resized(sight.size[1] * zoom, sight.size[0] * zoom)
+    whole = sight.camera.with_size(sight.size[1] * zoom, sight.size[0] * zoom)
     K = whole.K.clone()
     K[0, 2] -= left * zoom
     K[1, 2] -= top * zoom
@@ -166,14 +166,14 @@ def test_depths_of_all_are_those_of_the_plane_but_for_what_lies_behind(normal, s
     sight = Sight.of(normal)
     facing = torch.nn.functional.normalize(torch.tensor(normal), dim=0)
     photo = torch.rand(3, *size)
-    depth = upsampled(sight.log_depths, torch.ones(3, 24, 32), photo)
+    depth = upsample_depths(sight.log_depths, torch.ones(3, 24, 32), photo)
     fx, fy = sight.camera.K[0, 0] * size[1] / 32, sight.camera.K[1, 1] * size[0] / 24
     for made, share in [
         *((of_squares(squares(side, size), photo, depth), 0.35 * (side > 2)) for side in (1, 2, 4)),
         (ground(squares(4, size), photo, depth), 1.0),
     ]:
         assert len(made) and int(made.cells.max()) < 24 * 32 and float(made.x.max()) < size[1]
-        drawn = placed(made, sight.log_depths, depth.slopes, sight.camera, size)
+        drawn = place_elements(made, sight.log_depths, depth.slopes, sight.camera, size)
         ray = torch.stack(
             ((made.x - size[1] / 2) / fx, (made.y - size[0] / 2) / fy, torch.ones_like(made.x)), -1
         )
@@ -211,7 +211,7 @@ def test_footprints_in_the_own_photo_are_round_and_of_the_side(normal, side):
     and less; what a pinhole bends within an element, a hundredth."""
     sight = Sight.of(normal)
     made = sight.coarse(side)
-    drawn = project(sight.gaussians(made), sight.camera.resized(96, 72))
+    drawn = project(sight.gaussians(made), sight.camera.with_size(96, 72))
     l11, l21, l22 = drawn.roots.unbind(-1)
     middle = ((drawn.centres - torch.tensor([48.0, 36.0])).abs() < 20).all(-1)
     expected = (side * (0.5 if side < 4 else 0.85)) ** 2
@@ -328,7 +328,7 @@ def test_the_farther_surface_goes_on_under_the_nearer_one(dim, sign):
     assert torch.equal(made.colours, image[:, row, column].T)
     assert torch.equal(made.pixels, (3 * row + 1) * 72 + 3 * column + 1)
     camera = Camera(torch.eye(4), intrinsics_from_fov(60, 24, 24), 24, 24)
-    drawn = placed(made, log_depths, torch.zeros(24, 24), camera, (72, 72))
+    drawn = place_elements(made, log_depths, torch.zeros(24, 24), camera, (72, 72))
     assert torch.allclose(drawn.means[:, 2], torch.tensor(1.004).exp(), rtol=FLOAT32)
 
 
@@ -364,10 +364,10 @@ def test_numbers_stay_finite(kind):
     }[kind]
     size = (3 * grid[0], 3 * grid[1])
     photo, image = torch.rand(3, *size), torch.rand(3, *grid)
-    depth = upsampled(log_depths, image, photo)
+    depth = upsample_depths(log_depths, image, photo)
     parts = [of_squares(squares(side, size), photo, depth) for side in (1, 2, 4, 16)]
-    made = joined([*parts, ground(squares(4, size), photo, depth), under(log_depths, image, size)])
-    drawn = placed(made, log_depths, depth.slopes, Camera(torch.eye(4), K, grid[1], grid[0]), size)
+    made = join_elements([*parts, ground(squares(4, size), photo, depth), under(log_depths, image, size)])
+    drawn = place_elements(made, log_depths, depth.slopes, Camera(torch.eye(4), K, grid[1], grid[0]), size)
     for values in vars(drawn).values():
         assert torch.isfinite(values).all()
     assert (drawn.scales > 0).all() and (drawn.means[:, 2] > 0).all()
@@ -415,6 +415,6 @@ def test_drawn_in_nothing_ends_and_nothing_is_there():
 def test_rows_and_joined():
     made = Sight.of(grid=(6, 8)).coarse(4)
     first = made.rows(made.x < 6)
-    both = joined([first, made.rows(made.x >= 6)])
+    both = join_elements([first, made.rows(made.x >= 6)])
     assert len(first) == 5 and len(both) == len(made) == 30
     assert torch.equal(both.cells.sort().values, made.cells.sort().values)

@@ -39,7 +39,7 @@ def compensate_exposure(*photos: torch.Tensor) -> ExposureCompensation:
 
 
 def compared(*photos: torch.Tensor) -> Pairs:
-    return module.compared(rig_of(*photos))
+    return module.compare_photos(rig_of(*photos))
 
 
 def strip(num_views: int, shift: int = 12, seed: int = 0, low: float = 0.25, high: float = 0.75):
@@ -104,7 +104,7 @@ def test_known_lights_come_back_but_for_the_prior(num_views):
     assert (found.gains.log() - truth.gains.log() - moved[:, 0]).abs().amax() < allowed
     assert (found.offsets - truth.offsets - moved[:, 1]).abs().amax() < allowed
     assert centred(found)
-    gap = (found.corrected(changed) - images).abs().amax()
+    gap = (found.correct_photos(changed) - images).abs().amax()
     assert gap < 0.15 * (changed - images).abs().amax()
 
 
@@ -267,7 +267,7 @@ def test_without_contrast_most_is_a_gain_and_little_an_offset():
     images, *rest = strip(2)
     plain = torch.full_like(images, 0.5) * torch.tensor([0.8, 1.2])[:, None, None, None]
     found = compensate_exposure(plain, *rest)
-    after = found.corrected(plain)
+    after = found.correct_photos(plain)
     assert (after[0] - after[1]).abs().amax() < 0.02  # .2 before
     assert found.gains[0].amin() > 1.15 and found.offsets.abs().amax() < 0.03
     assert centred(found)
@@ -294,7 +294,7 @@ def test_a_chain_of_eight():
     changed = photographed(images, truth)
     found = compensate_exposure(changed, *rest)
     assert centred(found)
-    after = found.corrected(changed)
+    after = found.correct_photos(changed)
     before, left = ((v[:-1, ..., 80:] - v[1:, ..., : WIDTH - 80]).abs().mean() for v in (changed, after))
     assert left < 0.25 * before
 
@@ -396,9 +396,9 @@ def test_light_is_refused_where_its_shape_is_wrong_and_corrects_one_or_all(unche
     with pytest.raises(ValueError, match="gains: expected shape"):
         ExposureCompensation(torch.ones(2), torch.zeros(2, 3))
     light, images = lights(3), torch.rand(3, 3, 5, 7)
-    every = light.corrected(images)
+    every = light.correct_photos(images)
     assert every.dtype == images.dtype
-    assert torch.equal(light.corrected(images[1], view=1), every[1])
+    assert torch.equal(light.correct_photos(images[1], view=1), every[1])
     expected = images[2, 1] * float(light.gains[2, 1]) + float(light.offsets[2, 1])
     assert torch.allclose(every[2, 1], expected, atol=1e-6)  # float32
 

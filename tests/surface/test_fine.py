@@ -15,7 +15,7 @@ from langflash_core.splat import render
 from langflash_core.surface import fine as module
 from langflash_core.surface.detailed import assemble_detailed
 from langflash_core.surface.exposure_compensation import ExposureCompensation
-from langflash_core.surface.fine import _told, coloured_scene, covered_scene
+from langflash_core.surface.fine import _overlap_notes, coloured_scene, covered_scene
 from langflash_core.surface.settings import COLOURS, LAYERS
 from langflash_core.types import Camera, Scene
 from tests.scene.photographed import GRID, Photographed, photographed, png
@@ -61,8 +61,8 @@ def test_pictures_at_the_photos_places_are_nearer_to_them_than_with_copied_colou
     given = photographed(len(ratios), ratios)
     scene, light = made(given)
     check_scene(scene)
-    photos = [light.corrected(photo, view=v).clamp(0, 1) for v, photo in enumerate(given.photos)]
-    lit = replace(given.views, images=light.corrected(given.views.images).clamp(0, 1))
+    photos = [light.correct_photos(photo, view=v).clamp(0, 1) for v, photo in enumerate(given.photos)]
+    lit = replace(given.views, images=light.correct_photos(given.views.images).clamp(0, 1))
     copied = assemble_detailed(given.prediction, lit, photos, NORMAL)
     assert torch.equal(copied.gaussians.means, scene.gaussians.means)
     for view, photo in enumerate(photos):
@@ -205,15 +205,15 @@ def test_somebody_before_one_photo_leaves_no_trace_in_the_scene():
     here = f"{round(100 * shares[2])} % of {given.views.names[2]}"
     assert said == [f"{here} disagrees with the other photos and was left out"]
     drawn = render(scene, scene.camera(2, 120, 90), weight_maps=False).rgb.movedim(-1, 0)
-    behind = light.corrected(given.photos[2], view=2)[:, 15:81, 6:36]
+    behind = light.correct_photos(given.photos[2], view=2)[:, 15:81, 6:36]
     # .4 with somebody there; the borders of the hole are soft, and the others' layers fill the rest.
     assert float((drawn[:, 15:81, 6:36] - behind).abs().mean()) < 0.1
 
 
 def test_what_several_photos_show_alone_is_said_in_number_and_by_name():
-    said = _told({"shares": [0.42, 0.0, 0.16]}, ("a.jpg", "b.jpg", "c.jpg"))
+    said = _overlap_notes({"shares": [0.42, 0.0, 0.16]}, ("a.jpg", "b.jpg", "c.jpg"))
     shown = "42 % of a.jpg, 16 % of c.jpg disagree with the other photos and were left out"
-    assert said == [shown] and _told({}, ("a.jpg",)) == []
+    assert said == [shown] and _overlap_notes({}, ("a.jpg",)) == []
 
 
 def test_of_two_photos_nothing_is_left_out():

@@ -5,13 +5,13 @@ from dataclasses import replace
 import torch
 
 from langflash_core.splat import render
-from langflash_core.surface.fused import fused, fused_rows
+from langflash_core.surface.fused import fuse_layers, fused_rows
 from tests.splat.test_compose import SIZE, layered
 
 
 def test_of_two_layers_that_show_one_wall_one_keeps_it():
     scene = layered([(2, 0.2, 0), (2, 0.8, 1)], [0, 0.2])
-    whole = fused(scene)
+    whole = fuse_layers(scene)
     assert not whole.layered and len(whole.gaussians) < 0.75 * len(scene.gaussians)
     frames = [scene.layer(0), whole]
     camera = scene.camera(0)
@@ -22,7 +22,7 @@ def test_of_two_layers_that_show_one_wall_one_keeps_it():
 def test_its_colours_make_the_pictures_of_all_layers():
     """Two layers show one wall, grey of .3 and of .5: one surface of it is between both."""
     scene = layered([(2, 0.3, 0), (2, 0.5, 1)], [0, 0.2])
-    whole = fused(scene)
+    whole = fuse_layers(scene)
     for view, grey in enumerate((0.3, 0.5)):
         drawn = render(whole, scene.camera(view)).rgb
         assert abs(float(drawn[SIZE // 4 : -SIZE // 4, SIZE // 4 : -SIZE // 4].mean()) - grey) < 0.15
@@ -45,10 +45,10 @@ def test_what_no_photo_made_stays():
 
 def test_a_scene_without_layers_is_as_it_was():
     scene = layered([(2, 0.2, 0)], [0]).with_record(layered=False)
-    assert fused(scene) is scene
+    assert fuse_layers(scene) is scene
 
 
 def test_where_layers_show_nothing_nothing_fails():
     scene = layered([(2, 0.2, 0), (2, 0.8, 1)], [0, 0.2])
     empty = scene.rows(torch.zeros(len(scene.gaussians), dtype=torch.bool))
-    assert len(fused(empty).gaussians) == 0
+    assert len(fuse_layers(empty).gaussians) == 0

@@ -8,7 +8,7 @@ import torch
 from torch import Tensor
 from torch.nn import functional as F
 
-from langflash_core.surface.upsampling import upsampled
+from langflash_core.surface.upsampling import upsample_depths
 
 SIZES = [((9, 12), (27, 36)), ((9, 12), (9, 12)), ((7, 10), (17, 24)), ((6, 5), (12, 15)), ((8, 8), (19, 8))]
 FLOAT32 = 1e-5  # log depth: some tens of float32 roundings of numbers about 1
@@ -30,7 +30,7 @@ def two_sides(columns: Tensor, edge: float, near: float = 1.0, far: float = 2.0)
 @pytest.mark.parametrize("slopes", [(0.0, 0.0), (0.01, 0.0), (-0.004, 0.02), (0.01, 0.01)])
 def test_a_plane_is_exact(grid, size, slopes):
     """To its outermost pixels, whatever the ratio: inverse depth is linear in the picture."""
-    depth = upsampled(
+    depth = upsample_depths(
         -inverse_plane(grid, grid, slopes).log().float(), torch.rand(3, *grid), torch.rand(3, *size)
     )
     expected = -inverse_plane(size, grid, slopes).log()
@@ -49,7 +49,7 @@ def test_at_an_edge_every_pixel_has_the_depth_of_the_side_whose_colour_it_has(ra
     columns, pixels = torch.arange(12).expand(*grid), torch.arange(size[1]).expand(*size)
     image = two_sides(columns, edge, 0.2, 0.8).expand(3, *grid)
     photo = two_sides(pixels, moved, 0.2, 0.8).expand(3, *size)
-    depth = upsampled(two_sides(columns, edge).log(), image, photo)
+    depth = upsample_depths(two_sides(columns, edge).log(), image, photo)
     assert torch.allclose(depth.log_depths, two_sides(pixels, moved).log(), atol=FLOAT32)
     assert torch.equal(depth.cells % 12 < edge, pixels < moved)
 
@@ -64,7 +64,7 @@ def test_a_thin_thing_is_not_drawn_out(wide, upright):
     photo = F.interpolate(image[None], scale_factor=3.0, mode="nearest")[0]
     if not upright:
         log_depths, image, photo = log_depths.T, image.mT, photo.mT
-    depth = upsampled(log_depths.contiguous(), image, photo)
+    depth = upsample_depths(log_depths.contiguous(), image, photo)
     assert torch.allclose(depth.log_depths, torch.where(photo[0] > 0.5, 0.7, 0.0), atol=FLOAT32)
 
 
@@ -72,7 +72,7 @@ def test_without_colours_the_nearest_cell_decides_and_nothing_lies_between():
     torch.manual_seed(0)
     log_depths = torch.randint(0, 3, (9, 12)).float()  # jumps everywhere, of a factor of e
     grey = torch.full((3, 9, 12), 0.5)
-    depth = upsampled(log_depths, grey, torch.full((3, 27, 36), 0.5))
+    depth = upsample_depths(log_depths, grey, torch.full((3, 27, 36), 0.5))
     nearest = torch.arange(9 * 12).view(9, 12).repeat_interleave(3, 0).repeat_interleave(3, 1)
     assert torch.equal(depth.cells, nearest)
     # A cell's own slope may change its inverse depth by a tenth: .106 of its logarithm.
@@ -84,7 +84,7 @@ def test_a_slanted_surface_ends_at_its_edge_with_its_own_slope():
     slope = (0.004, 0.002)
     columns, pixels = torch.arange(16).expand(*grid), torch.arange(48).expand(*size)
     logs = torch.where(columns < 7, -inverse_plane(grid, grid, slope).log(), 2.0).float()
-    depth = upsampled(
+    depth = upsample_depths(
         logs,
         two_sides(columns, 7, 0.2, 0.8).expand(3, *grid),
         two_sides(pixels, 22, 0.2, 0.8).expand(3, *size),
@@ -96,7 +96,7 @@ def test_a_slanted_surface_ends_at_its_edge_with_its_own_slope():
 @pytest.mark.parametrize("grid", [(1, 1), (1, 5), (5, 1), (2, 2)])
 def test_a_cell_a_row_a_column(grid):
     size = (3 * grid[0], 2 * grid[1])
-    depth = upsampled(torch.full(grid, 0.3), torch.rand(3, *grid), torch.rand(3, *size))
+    depth = upsample_depths(torch.full(grid, 0.3), torch.rand(3, *grid), torch.rand(3, *size))
     assert torch.allclose(depth.log_depths, torch.full(size, 0.3), atol=FLOAT32)
     assert torch.equal(depth.slopes, torch.zeros(grid))
     assert int(depth.cells.min()) == 0 and int(depth.cells.max()) == grid[0] * grid[1] - 1
@@ -105,7 +105,7 @@ def test_a_cell_a_row_a_column(grid):
 def test_cells_are_those_of_the_grid_near_the_pixel():
     torch.manual_seed(1)
     grid, size = (7, 10), (17, 24)
-    depth = upsampled(torch.randn(grid), torch.rand(3, *grid), torch.rand(3, *size))
+    depth = upsample_depths(torch.randn(grid), torch.rand(3, *grid), torch.rand(3, *size))
     assert int(depth.cells.min()) >= 0 and int(depth.cells.max()) < 70
     rows = (torch.arange(17) + 0.5) * 7 / 17 - 0.5
     columns = (torch.arange(24) + 0.5) * 10 / 24 - 0.5
@@ -155,7 +155,7 @@ def test_it_agrees_with_its_twin_pixel_by_pixel(grid, size):
     patches = (torch.arange(grid[0])[:, None] + 1) // 2 + (torch.arange(grid[1]) + 1) // 2
     logs = patches % 3 + 0.1 * torch.rand(grid)
     image, photo = torch.rand(3, *grid), torch.rand(3, *size)
-    depth = upsampled(logs, image, photo)
+    depth = upsample_depths(logs, image, photo)
     arrays = [values.double().numpy() for values in (logs, image, photo)]
     for y in range(size[0]):
         for x in range(size[1]):

@@ -129,7 +129,7 @@ def test_the_border_of_a_photo_takes_nothing_over(turns, monkeypatch):
     """Of more than two: where another photo's picture ends both stay, that no crack opens between them."""
     given = seen([camera(turn=(turn, 0.0)) for turn in turns])
     everybody_leads(monkeypatch)
-    monkeypatch.setattr(view_selection, "_closed", lambda cells: cells)
+    monkeypatch.setattr(view_selection, "_close_mask", lambda cells: cells)
     left, border = ~select_views(*given), view_selection._BORDER if len(turns) > 2 else 0
 
     def within(view: int, margin: float) -> Tensor:
@@ -148,7 +148,7 @@ def test_one_that_does_not_lead_takes_over_up_to_its_border(leads, monkeypatch):
     far, near = camera(), camera((0.0, 0.0, 3 - 3 / 2.2))
     given = seen([far, near, far], fov=20)
     monkeypatch.setattr(view_selection, "leading", lambda *of: [0, 1] if leads else [0])
-    monkeypatch.setattr(view_selection, "_closed", lambda cells: cells)
+    monkeypatch.setattr(view_selection, "_close_mask", lambda cells: cells)
     border = inside(*given, view=0, other=1) & ~inside(*given, view=0, other=1, margin=view_selection._BORDER)
     assert border.any() and (select_views(*given)[0][border] == leads).all()
 
@@ -257,7 +257,7 @@ def test_no_surface_that_somebody_sees_is_left_without_an_owner(seed, count, mon
     given = seen(drawn_views(seed, count), [WALL, ((0.9, 0.1, 0.42), 1.9)][: 1 + seed % 2])
     everybody_leads(monkeypatch)
     keep = select_views(*given)
-    monkeypatch.setattr(view_selection, "_closed", lambda cells: cells)
+    monkeypatch.setattr(view_selection, "_close_mask", lambda cells: cells)
     asked = select_views(*given)
     assert not without_owner(asked, *given).any()
     crumbs = asked & ~keep

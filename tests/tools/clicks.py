@@ -17,7 +17,7 @@ import numpy as np
 import torch
 from PIL import Image
 
-from langflash_core.mending.looks import drawn, mattes
+from langflash_core.mending.looks import draw_scene, mattes
 from langflash_core.pipeline import reconstruct
 from langflash_core.scene.regions import regions_of
 from langflash_core.splat.outlines import silhouette
@@ -130,8 +130,8 @@ def judged(
         line, column = np.unravel_index(deep.argmax(), deep.shape)
         pixels = np.asarray(np.hypot(lines - line, columns - column) <= RADIUS)
         chosen, *others = select(seen_in(scene, every, camera, pixels))
-        true, seen = mask_of(shape, frame, half), camera.resized(*half)
-        matte = mattes(scene, torch.from_numpy(chosen), [seen], drawn)[0][0].numpy() > 0.5
+        true, seen = mask_of(shape, frame, half), camera.with_size(*half)
+        matte = mattes(scene, torch.from_numpy(chosen), [seen], draw_scene)[0][0].numpy() > 0.5
         own = overlap(matte, true)
         found[name] = (
             own,

@@ -30,7 +30,7 @@ import numpy as np
 from PIL import Image
 
 from langflash_core.base.formats import kind_of
-from langflash_core.base.outputs import READERS, loaded
+from langflash_core.base.outputs import READERS, import_reference
 from langflash_core.base.resources import asset_path, shader_path
 from langflash_core.errors import LangFlashError
 from tests.torture.failing import Fault, failing, small_disk
@@ -218,7 +218,7 @@ def sound(path: Path) -> str:
             with np.load(path) as stored:
                 _ = [stored[name] for name in stored.files]
         elif kind_of(path) in READERS:
-            loaded(READERS[kind_of(path)])(path)
+            import_reference(READERS[kind_of(path)])(path)
         elif not path.stat().st_size:
             return "empty"
     except Exception as error:

@@ -9,7 +9,7 @@ from typing import TextIO
 from langflash_core.__main__ import in_program
 from langflash_core.base.files import check_folder, held_alone, readable_file
 from langflash_core.base.outputs import ALL_OUT, output_of
-from langflash_core.base.request import spoken
+from langflash_core.base.request import trim_phrases
 from langflash_core.batch.dispatch import Job
 from langflash_core.batch.ledger import FAILED, Ledger
 from langflash_core.batch.order import Order, export_path
@@ -66,7 +66,7 @@ def _order(args: Namespace) -> Order:
     Raises:
         LangFlashError: one cannot be used, or what it needs is not installed.
     """
-    prompts = tuple(spoken(args.prompt or []))
+    prompts = tuple(trim_phrases(args.prompt or []))
     exports = tuple(dict.fromkeys(args.export or []))
     _check_exports(exports, prompts)
     weights = None if args.weights is None else args.weights.absolute()

@@ -38,13 +38,13 @@ def run(args: Namespace, out: TextIO) -> None:
             check_output_file(path, (suffix,), inputs=taken, option=option)
 
     from langflash_core.export.paint import write_picture
-    from langflash_core.mending.cleaning import cleaned
+    from langflash_core.mending.cleaning import apply_recipe
     from langflash_core.scene.file import save
 
     scene = open_scene(args.scene, args.axes)
     with ProgressBar() as progress:
         progress("looking", 0.2)
-        found = cleaned(scene, recipe)
+        found = apply_recipe(scene, recipe)
         done, picture = _done(args, scene, found)
     make_folder(args.output.parent)
     save(done, args.output)

@@ -7,7 +7,7 @@ from typing import TextIO
 
 from langflash_core.base.files import readable_file
 from langflash_core.base.outputs import output_of
-from langflash_core.base.request import ExportRequest, spoken
+from langflash_core.base.request import ExportRequest, trim_phrases
 from langflash_core.errors import SceneFileError
 
 from ..report import ProgressBar
@@ -20,13 +20,13 @@ def run(args: Namespace, out: TextIO) -> None:
         LangFlashError: the scene, a phrase, the camera or the output cannot be used, or
             nothing answers.
     """
-    from langflash_core.writing import prepared, write
+    from langflash_core.writing import prepare_output, write
 
     from ..renderers import open_renderer
     from ..scenes import open_scene, say_hints
 
     request = request_of(args)
-    prepared(request)
+    prepare_output(request)
     for path in (args.scene, *args.beside):
         readable_file(path, "scene", SceneFileError)
     scene = open_scene(args.scene, request.axes_of(args.scene))
@@ -52,4 +52,4 @@ def request_of(args: Namespace) -> ExportRequest:
         field.name: getattr(args, field.name) for field in fields(ExportRequest) if field.name != "prompts"
     }
     said |= {"ortho": bool(args.ortho), "beside": tuple(args.beside)}
-    return ExportRequest(**said, prompts=tuple(spoken(args.prompt or [])))
+    return ExportRequest(**said, prompts=tuple(trim_phrases(args.prompt or [])))

@@ -34,13 +34,13 @@ def run(args: Namespace, out: TextIO) -> None:
     requests = [_request(path, args) for path in args.output or ()]
     names = [_named(text) for text in args.name or ()]
     from langflash_core.inventory import inventory
-    from langflash_core.writing import prepared, write
+    from langflash_core.writing import prepare_output, write
 
     from ..renderers import open_renderer
     from ..scenes import open_scene
 
     for request in requests:
-        prepared(request)
+        prepare_output(request)
     with ProgressBar() as progress:
         scene = open_scene(args.scene)
         progress("looking for things", 0.2)

@@ -39,7 +39,7 @@ def run(args: Namespace, out: TextIO) -> None:
     world = level.found_world(scene, up=args.up, north=args.north, origin=args.origin)
     scene = scene.with_record(world=world)
     if metres is not None:
-        scene = level.measured(scene, _place(scene, first), _place(scene, last), metres)
+        scene = level.apply_measurement(scene, _place(scene, first), _place(scene, last), metres)
     for name in ("ceiling", "door"):
         if getattr(args, name) is not None:
             scene = level.measured_by(scene, name, getattr(args, name))

@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any, TextIO
 
 from langflash_core.base.files import check_folder, staged_folder
 from langflash_core.base.phrases import read_phrases
-from langflash_core.base.request import spoken
+from langflash_core.base.request import trim_phrases
 from langflash_core.errors import InputError
 
 from ..files import checked_scene
@@ -28,10 +28,10 @@ def run(args: Namespace, out: TextIO) -> None:
         LangFlashError: the scene, a phrase, the camera or the folder cannot be used.
     """
     words = [args.scene, *args.phrases] if args.scenes and args.scene else args.phrases
-    prompts = spoken([*words, *([] if args.phrase_file is None else read_phrases(args.phrase_file))])
+    prompts = trim_phrases([*words, *([] if args.phrase_file is None else read_phrases(args.phrase_file))])
     if not prompts or not (args.scene or args.scenes):
         raise InputError("name a scene, or --scenes, and at least one phrase; see langflash query --help")
-    negatives = None if args.negatives is None else spoken(args.negatives)
+    negatives = None if args.negatives is None else trim_phrases(args.negatives)
     if args.scenes:
         run_survey(args, prompts, negatives, out)
     else:

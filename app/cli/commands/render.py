@@ -6,9 +6,9 @@ from typing import Any, TextIO
 
 from langflash_core.base.colormaps import HeatColours
 from langflash_core.base.files import check_output_file, readable_file
-from langflash_core.base.outputs import loaded
+from langflash_core.base.outputs import import_reference
 from langflash_core.base.pictures import Picture
-from langflash_core.base.request import spoken
+from langflash_core.base.request import trim_phrases
 from langflash_core.errors import InputError, PromptError, SceneFileError
 from langflash_core.export.paint import write_picture
 from langflash_core.types import Scene
@@ -41,7 +41,7 @@ def run(args: Namespace, out: TextIO) -> None:
     with ProgressBar() as progress, open_renderer(args.backend, fade=args.fade, fill=args.fill) as renderer:
         progress("drawing", 0.2)
         look = Look(scene, camera, renderer, tuple(prompts), atom or 0, colours)
-        pixels, more = loaded(picture.painter)(look)
+        pixels, more = import_reference(picture.painter)(look)
     write_picture(args.output, pixels)
     document = {
         "file": str(args.output),
@@ -61,7 +61,7 @@ def _prompts_for(picture: Picture, word: str, given: Sequence[str] | None) -> li
         if given:
             raise PromptError(f"--what {word} takes no --prompt; use --what relevance or labels")
         return []
-    prompts = spoken(given or [])
+    prompts = trim_phrases(given or [])
     if not prompts:
         raise PromptError(f'--what {word} needs a phrase; add --prompt "armchair"')
     if picture.one and len(prompts) > 1:

@@ -12,7 +12,7 @@ from langflash_core.base.files import readable_file
 from langflash_core.base.resources import asset_path, weights_folder
 from langflash_core.errors import WeightsError
 from langflash_core.network import PRESETS, load_network
-from langflash_core.network.checkpoints.catalogue import CATALOGUE, CLIP, OTHERS, SAM2, published
+from langflash_core.network.checkpoints.catalogue import CATALOGUE, CLIP, OTHERS, SAM2, find_published
 from langflash_core.network.checkpoints.download import download
 from langflash_core.network.checkpoints.parts import FORMAT, part_folder, read_part
 from langflash_core.network.checkpoints.store import install, verify_part
@@ -69,7 +69,7 @@ def _import(args: Namespace, out: TextIO) -> None:
 
 
 def _get(args: Namespace, out: TextIO) -> None:
-    entry = published(args.name)
+    entry = find_published(args.name)
     if entry is CLIP:
         from langflash_core.language.clip import fetch_clip
 
@@ -97,7 +97,7 @@ def _say_file(args: Namespace, out: TextIO, path: Path) -> None:
 
 
 def _installed(args: Namespace, out: TextIO, checkpoint: Path, output: Path | None) -> None:
-    preset = PRESETS[args.preset] if "preset" in args else PRESETS[published(args.name).preset]
+    preset = PRESETS[args.preset] if "preset" in args else PRESETS[find_published(args.name).preset]
     done = install(checkpoint, preset, output, side=getattr(args, "size", None))
     part, *others = done.paths
     _say(args, out, [_entry(part), *({"path": str(p), "bytes": p.stat().st_size} for p in others)])

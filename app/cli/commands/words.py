@@ -60,7 +60,7 @@ def _teach(args: Namespace, out: TextIO) -> None:
     check_output_file(args.output, (".langflash",), inputs=[args.scene])
     from dataclasses import replace
 
-    from langflash_core.appearance import taken
+    from langflash_core.appearance import lessons_taken
     from langflash_core.language.lessons import read_lessons, with_lessons
     from langflash_core.scene.file import save
 
@@ -68,7 +68,7 @@ def _teach(args: Namespace, out: TextIO) -> None:
 
     lessons = read_lessons(args.words)
     scene = open_scene(args.scene)
-    took = taken(scene, lessons)
+    took = lessons_taken(scene, lessons)
     save(replace(scene, record=with_lessons(scene.record, took)), args.output)
     groups = [{"group": k, "name": one.name, "denied": list(one.denied)} for k, one in sorted(took.items())]
     if args.json:

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import TextIO
 
 from langflash_core.base.files import check_output_file, make_folder, readable_file, write_atomically
-from langflash_core.base.request import spoken
+from langflash_core.base.request import trim_phrases
 from langflash_core.errors import ImageError, InputError, WeightsError
 from langflash_core.lab.evaluation.rooms.run import run_eval
 from langflash_core.lab.evaluation.tables import markdown
@@ -181,7 +181,7 @@ def _photos(args: Namespace, out: TextIO) -> None:
     from .sheets.pairs import PROMPTS, pair_sheet
 
     pairs = list(zip(photos[::2], photos[1::2], strict=True))
-    prompts = PROMPTS if args.prompt is None else spoken(args.prompt)
+    prompts = PROMPTS if args.prompt is None else trim_phrases(args.prompt)
     with open_renderer(None) as renderer:
         sheet = pair_sheet(pairs, renderer, weights=args.weights, prompts=prompts)
     stream = io.BytesIO()

@@ -73,13 +73,13 @@ class LiftScene(Request):
 
     def run(self, serial: int, progress: Callable[[str, float], None], cancelled: Asked) -> PhrasesTaught:
         from langflash_core.lift import lift
-        from langflash_core.mending.looks import drawn
+        from langflash_core.mending.looks import draw_scene
         from langflash_core.scene.edited import edited_scene
 
         own = self.info
         scene = lift(
             edited_scene(own.scene, self.marks),
-            render=lambda scene, camera: drawn(scene, camera, weight_maps=False),
+            render=lambda scene, camera: draw_scene(scene, camera, weight_maps=False),
             progress=progress,
             cancelled=cancelled,
         )

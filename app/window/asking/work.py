@@ -172,11 +172,11 @@ class ListParts(SceneTask):
         from langflash_core.language.spaces import language_space
         from langflash_core.language.spoken import compile_spoken
         from langflash_core.meant import meant_relevance
-        from langflash_core.scene.edited import left, spoken_scene
+        from langflash_core.scene.edited import spoken_scene, without_deleted
         from langflash_core.segments import photo_shares
 
         marks, memory = self.marks, self.memory
-        scene = left(spoken_scene(memory.changed(marks), marks), marks)
+        scene = without_deleted(spoken_scene(memory.changed(marks), marks), marks)
         space = language_space(scene.semantics.space)
         compiled = compile_spoken(scene, space, [self.text], negatives=list(self.negatives) or None)
         relevance = meant_relevance(scene, compiled, [self.cut])[0][0].cpu()
@@ -301,16 +301,16 @@ class WeighAtoms(SceneTask):
 def _shares(scene: "Scene", marks: Marks | None) -> tuple[float, ...]:
     """(K,) of the opacity that is left, sum 1."""
     from langflash_core.scene.atoms import atom_shares
-    from langflash_core.scene.edited import left
+    from langflash_core.scene.edited import without_deleted
 
-    return tuple(map(float, atom_shares(scene if marks is None else left(scene, marks))))
+    return tuple(map(float, atom_shares(scene if marks is None else without_deleted(scene, marks))))
 
 
 def _places(scene: "Scene", marks: Marks | None) -> tuple[Vector | None, ...]:
     """(K,) where each atom is by now, world; None where nothing of it is left."""
     from langflash_core.scene.atoms import atom_places
     from langflash_core.scene.changed import changed_scene
-    from langflash_core.scene.edited import left
+    from langflash_core.scene.edited import without_deleted
 
-    placed = scene if marks is None else left(changed_scene(scene, marks), marks)
+    placed = scene if marks is None else without_deleted(changed_scene(scene, marks), marks)
     return tuple(place and Vector(*place) for place in atom_places(placed))

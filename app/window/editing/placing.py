@@ -72,7 +72,7 @@ class ShowTint:
         marks = state.editing.marks
         if marks is None or not marks.selected:
             return state
-        gesture = Recoloured.tinted(marks.selected, self.tint.colour, self.tint.strength, self.luma)
+        gesture = Recoloured.tint(marks.selected, self.tint.colour, self.tint.strength, self.luma)
         return state.with_scene(mode=pictures.RGB).with_editing(
             tint=self.tint, gesture=gesture, last_tint=self.tint
         )

@@ -177,7 +177,7 @@ class Floaters:
         return self.recipe != Recipe(self.strength)
 
     def mask(self, visible: Mask) -> Mask:
-        """Gaussians that go, of what is shown, by `langflash_core.mending.cleaning.cleaned`."""
+        """Gaussians that go, of what is shown, by `langflash_core.mending.cleaning.apply_recipe`."""
         found = Mask.none(visible.count)
         if not self.least or self.recipe.empty:
             return found

@@ -312,7 +312,7 @@ class ScoreFloaters(EditTask):
     def _by_rules(self, shown: "Scene") -> "tuple[Mask | None, Mask | None, Mask | None, Box | None]":
         """What meets a rule, what answers its phrases, what is outside its box, and that."""
         from langflash_core.meant import answering
-        from langflash_core.mending.cleaning import box_of, inside, measured, meeting
+        from langflash_core.mending.cleaning import box_of, inside, measure_gaussians, meeting
 
         recipe, about = self.recipe, (self.marks.changes,)
         ruled = spoken = outside = box = None
@@ -320,7 +320,9 @@ class ScoreFloaters(EditTask):
             rows = meeting(
                 shown,
                 rule,
-                lambda name: self.memory.answered(f"measure {name}", about, lambda: measured(shown, name)),
+                lambda name: self.memory.answered(
+                    f"measure {name}", about, lambda: measure_gaussians(shown, name)
+                ),
             )
             ruled = Mask.of(rows) if ruled is None else ruled | Mask.of(rows)
         if recipe.within:
@@ -347,13 +349,13 @@ class FindMargins(EditTask):
         import torch
 
         from langflash_core.mending.hiding import least_margins
-        from langflash_core.mending.looks import drawn
+        from langflash_core.mending.looks import draw_scene
         from langflash_core.scene.edited import edited_scene
 
         left = self.marks.left.rows()
         members = torch.from_numpy(self.marks.selected.rows()[left])
         found = np.full(len(left), np.inf, np.float32)
-        found[left] = least_margins(edited_scene(self.scene, self.marks), members, drawn).numpy()
+        found[left] = least_margins(edited_scene(self.scene, self.marks), members, draw_scene).numpy()
         return found.tobytes()
 
 
@@ -524,7 +526,7 @@ class FindLessons(EditTask):
     path: Path
 
     def run(self, stopping: Asked) -> Iterator[Command]:
-        from langflash_core.appearance import taken
+        from langflash_core.appearance import lessons_taken
         from langflash_core.language.lessons import read_lessons
         from langflash_core.scene.edited import spoken_scene
 
@@ -533,7 +535,7 @@ class FindLessons(EditTask):
                 yield Notify("Nothing is saved yet; name a group and keep the name for other scenes.", "info")
                 return
             record = spoken_scene(self.scene, self.marks).record
-            found = taken(replace(self.scene, record=record), read_lessons(self.path))
+            found = lessons_taken(replace(self.scene, record=record), read_lessons(self.path))
             yield WordsFound(tuple((k, one.name, one.denied) for k, one in sorted(found.items())))
         finally:
             yield StopWaiting()

@@ -109,7 +109,7 @@ def seen_best(state: State, row: Row) -> Pose:
     info, low, high = state.scene.info, row.corners.min(0), row.corners.max(0)
     middle = (low + high) / 2
     views = [info.views[view] for view in row.photos if view < len(info.views)] if info is not None else []
-    start = poses.righted(views[0] if views else state.scene.pose, state.up)
+    start = poses.make_upright(views[0] if views else state.scene.pose, state.up)
     way = middle - np.array(start.centre)
     forward = (
         Vector(*way.tolist()) if views and float(way @ way) > 1e-12 else Vector(*start.axes[:, 2].tolist())

@@ -38,10 +38,10 @@ class TakeInventory(SceneTask):
 
     def run(self, stopping: Asked) -> Iterator[Command]:
         from langflash_core.inventory import inventory
-        from langflash_core.scene.edited import left, spoken_scene
+        from langflash_core.scene.edited import spoken_scene, without_deleted
 
         spoken = spoken_scene(self.memory.changed(self.marks), self.marks)
-        scene = left(spoken, self.marks).with_record(
+        scene = without_deleted(spoken, self.marks).with_record(
             world=self.marks.world, metric_scale=self.marks.metric_scale, thing_names=self.marks.thing_names
         )
         found = inventory(scene)

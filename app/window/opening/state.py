@@ -79,7 +79,7 @@ NO_OPENING = Opening()
 def told_film(film: Film) -> dict:
     """What a scene's record says of frames that were not taken, as `Record.left_out` has it."""
     why = {REASONS[key]: count for key, count in film.left_out.items() if count}
-    return {"film": film.strip.film, "frames": film.strip.looked, "why": why}
+    return {"film": film.strip.film, "frames": film.strip.num_looked_at, "why": why}
 
 
 def small(path: Path) -> str:

@@ -32,10 +32,10 @@ class SceneMemory:
 
         more: a change that is not in the marks yet.
         """
-        from langflash_core.scene.changed import changed
+        from langflash_core.scene.changed import apply_changes
 
         gaussians = self._under(marks.changes)
-        gaussians = changed(gaussians, () if more is None else (more,))
+        gaussians = apply_changes(gaussians, () if more is None else (more,))
         return self.scene if gaussians is self.scene.gaussians else replace(self.scene, gaussians=gaussians)
 
     def answered(self, question: str, about: tuple, ask: Callable[[], Answer]) -> Answer:
@@ -55,13 +55,13 @@ class SceneMemory:
 
     def _under(self, changes: tuple[Change, ...]) -> "Gaussians":
         """After all changes, going on from a result that is the beginning of them, where one is there."""
-        from langflash_core.scene.changed import changed
+        from langflash_core.scene.changed import apply_changes
 
         best, start = (), self.scene.gaussians
         for done, result in self._changed:
             if len(done) >= len(best) and changes[: len(done)] == done:
                 best, start = done, result
-        made = changed(start, changes[len(best) :])
+        made = apply_changes(start, changes[len(best) :])
         if len(best) < len(changes) and made is not self.scene.gaussians:
             self._changed = (*self._changed[-1:], (changes, made))
         return made

@@ -42,19 +42,19 @@ class FillHole(Job):
 
         from langflash_core.mending.filling import fill
         from langflash_core.mending.hiding import preview
-        from langflash_core.mending.looks import drawn
+        from langflash_core.mending.looks import draw_scene
         from langflash_core.scene.edited import there
-        from langflash_core.scene.joining import appended
+        from langflash_core.scene.joining import append_part
 
         progress("looking", 0.1)
         own, marks = self.info, self.marks
         kept = marks.left.rows()[: marks.there[0]]
         shown = there(own.memory.changed(marks), marks).rows(torch.from_numpy(kept))
-        render = _watched(drawn, progress, cancelled)
+        render = _watched(draw_scene, progress, cancelled)
         gone = preview(shown, torch.from_numpy(marks.selected.rows()[: len(kept)][kept]), render, _EDGE)
         patch, rows = fill(shown, gone, render), np.zeros(marks.selected.count, bool)
         rows[np.flatnonzero(kept)] = gone.numpy()
-        info = describe_scene(appended(there(own.scene, marks), patch), serial, own.name, own.path)
+        info = describe_scene(append_part(there(own.scene, marks), patch), serial, own.name, own.path)
         taken = Mask.of(rows)
         beyond = len(taken - marks.selected)
         return Merged(own.serial, marks.there, info, own.name, taken, beyond=beyond)
@@ -71,12 +71,12 @@ class CopyPart(Job):
         import torch
 
         from langflash_core.scene.edited import there
-        from langflash_core.scene.joining import appended
+        from langflash_core.scene.joining import append_part
 
         own, marks = self.info, self.marks
         chosen = torch.from_numpy(np.flatnonzero(marks.selected.rows()))
         copies = own.memory.changed(marks).rows(chosen)
-        info = describe_scene(appended(there(own.scene, marks), copies), serial, own.name, own.path)
+        info = describe_scene(append_part(there(own.scene, marks), copies), serial, own.name, own.path)
         return Merged(own.serial, marks.there, info, own.name, copied=True)
 
 
@@ -96,19 +96,19 @@ class ClonePart(Job):
         import torch
 
         from langflash_core.mending.cloning import clone
-        from langflash_core.mending.looks import drawn
+        from langflash_core.mending.looks import draw_scene
         from langflash_core.scene.edited import there
-        from langflash_core.scene.joining import appended
+        from langflash_core.scene.joining import append_part
 
         progress("looking", 0.1)
         own, marks = self.info, self.marks
         visible = torch.from_numpy(marks.visible.rows()[: marks.there[0]])
         shown = there(own.memory.changed(marks), marks)
-        render = _watched(drawn, progress, cancelled)
+        render = _watched(draw_scene, progress, cancelled)
         copies, gone = clone(shown, visible, self.source, self._stroke(), render, fit=self.fit)
         rows = np.zeros(marks.selected.count, bool)
         rows[: len(gone)] = gone.numpy()
-        info = describe_scene(appended(there(own.scene, marks), copies), serial, own.name, own.path)
+        info = describe_scene(append_part(there(own.scene, marks), copies), serial, own.name, own.path)
         return Merged(own.serial, marks.there, info, own.name, Mask.of(rows), copied=True)
 
     def _stroke(self) -> "Stroke":
@@ -158,14 +158,14 @@ class HidePart(Job):
         import torch
 
         from langflash_core.mending.hiding import Hiding, hide
-        from langflash_core.mending.looks import drawn
+        from langflash_core.mending.looks import draw_scene
         from langflash_core.scene.edited import edited_scene
 
         progress("looking", 0.1)
         own, marks = self.info, self.marks
         scene = edited_scene(own.scene, marks)
         members = torch.from_numpy(marks.selected.rows()[marks.left.rows()])
-        render = _watched(drawn, progress, cancelled)
+        render = _watched(draw_scene, progress, cancelled)
         done, report = hide(scene, members, render, Hiding(self.how, margin=self.margin))  # type: ignore[arg-type]
         count = report.members + report.rim
         photos = f", {len(report.photos)} photos painted over" if report.photos else ""

@@ -121,7 +121,7 @@ def first_stand(info: SceneInfo, world: World | None) -> Pose:
     turn = rotations.matrix(world.turn)
     if not info.views:
         return poses.facing(start, Vector(*turn[2].tolist()), -turn[1])
-    return poses.righted(start, -turn[1]) if abs(poses.roll(start, -turn[1])) > ASLANT else start
+    return poses.make_upright(start, -turn[1]) if abs(poses.roll(start, -turn[1])) > ASLANT else start
 
 
 def middle_of_near(state: State) -> Vector | None:
@@ -227,4 +227,4 @@ def _turned(state: State, pose: Pose, yaw: float, pitch: float) -> Pose:
     pose = poses.look(pose, yaw, pitch, state.up)
     if state.world is None:
         return pose
-    return poses.righted(pose, state.up, 1 - math.exp(-math.hypot(yaw, pitch) / RIGHTING))
+    return poses.make_upright(pose, state.up, 1 - math.exp(-math.hypot(yaw, pitch) / RIGHTING))

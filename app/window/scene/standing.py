@@ -44,4 +44,4 @@ class Levelled:
         told = tuple(toast for toast in state.toasts if toast.text != LOOKING)
         after = with_edit(replace(state, toasts=told), "Level the scene", replace(marks, world=self.world))
         after = Notify(text if self.world.sure else f"{UNSURE} {text}", "info").apply(after)
-        return FlyTo(poses.righted(after.scene.pose, after.up)).apply(after)
+        return FlyTo(poses.make_upright(after.scene.pose, after.up)).apply(after)

@@ -125,12 +125,12 @@ class JoinScenes(Job):
     def run(self, serial: int, progress: Callable[[str, float], None], cancelled: Asked) -> Merged:
         from langflash_core.export import read as read_scene
         from langflash_core.scene.edited import edited_scene, there
-        from langflash_core.scene.joining import joined
-        from langflash_core.surface.fused import fused
+        from langflash_core.scene.joining import join_scenes
+        from langflash_core.surface.fused import fuse_layers
 
         own, name = self.info, self.path.name
         first, shown = there(own.scene, self.marks), edited_scene(own.scene, self.marks)
-        scene = joined(first, fused(read_scene(self.path)), (own.name, name), shown)
+        scene = join_scenes(first, fuse_layers(read_scene(self.path)), (own.name, name), shown)
         info = describe_scene(scene, serial, own.name, own.path)
         return Merged(own.serial, self.marks.there, info, name)
 
@@ -242,9 +242,9 @@ class FindWorld(SceneTask):
 
     def run(self, stopping: Asked) -> Iterator[Command]:
         from langflash_core.level import found_world
-        from langflash_core.scene.edited import left
+        from langflash_core.scene.edited import without_deleted
 
-        yield Levelled(found_world(left(self.memory.changed(self.marks), self.marks)))
+        yield Levelled(found_world(without_deleted(self.memory.changed(self.marks), self.marks)))
 
 
 @dataclass(frozen=True)

@@ -9,7 +9,7 @@ from langflash_core.base import pictures
 from langflash_core.errors import InputError
 from langflash_core.geometry.poses import Pose, Vector
 from langflash_core.scene.settings import TOURS
-from langflash_core.scene.tour import Note, Stop, Tour, checked, told_tour
+from langflash_core.scene.tour import Note, Stop, Tour, check_tour, told_tour
 
 from ..asking.commands import AddPrompt, EditPrompt, SelectPrompt, ShowPrompt
 from ..asking.prompt_sets import MOST_PROMPTS
@@ -137,7 +137,7 @@ class ChangeNote:
         notes = list(tour.notes)
         notes[self.place] = replace(notes[self.place], text=self.text)
         return _with_tour(
-            state, f"Change note {self.place + 1}", lambda: checked(replace(tour, notes=tuple(notes)))
+            state, f"Change note {self.place + 1}", lambda: check_tour(replace(tour, notes=tuple(notes)))
         )
 
 

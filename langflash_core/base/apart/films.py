@@ -43,7 +43,7 @@ def answers(reader: str, request: dict[str, Any], content: bytes) -> Iterator[tu
     Raises:
         ValueError: it cannot be decoded, or has too many pixels.
     """
-    with _opened(request["path"]) as capture:
+    with _open_capture(request["path"]) as capture:
         film = _Film(request["path"], capture)
         if reader == "film":
             yield film.facts(), {}
@@ -52,7 +52,7 @@ def answers(reader: str, request: dict[str, Any], content: bytes) -> Iterator[tu
 
 
 @contextmanager
-def _opened(path: str) -> Iterator[cv2.VideoCapture]:
+def _open_capture(path: str) -> Iterator[cv2.VideoCapture]:
     cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
     capture = cv2.VideoCapture(path, cv2.CAP_FFMPEG)
     try:
@@ -93,7 +93,7 @@ class _Film:
         """Of `answers`. None is given before it is clear whether it is believed."""
         held: list[tuple[float, np.ndarray]] = []  # the last ones, all equal
         doubtful, decoded = False, False
-        for seconds, picture in self._decoded(start, end, looks, most):
+        for seconds, picture in self._decode(start, end, looks, most):
             decoded = True
             if picture is None:
                 yield {"seconds": seconds}, {}
@@ -114,7 +114,7 @@ class _Film:
         if not decoded and (program := _program()):
             yield from _parts(self._again(program, start, end, looks), False)
 
-    def _decoded(
+    def _decode(
         self, start: float, end: float | None, looks: float, most: int
     ) -> Iterator[tuple[float, np.ndarray | None]]:
         """By OpenCV: seconds and pictures; None now and then."""
@@ -137,7 +137,7 @@ class _Film:
             if picture.shape[0] * picture.shape[1] * max(self._stretch, 1 / self._stretch) > most:
                 raise ValueError(f"has pictures of more than {most:,} pixels")
             due = max(due + 1 / looks, seconds)
-            yield seconds, self._shaped(picture)
+            yield seconds, self._resize(picture)
 
     def _again(
         self, program: str, start: float, end: float | None, looks: float
@@ -180,7 +180,7 @@ class _Film:
             return width, round(height * self._stretch)
         return round(width * self._stretch), height
 
-    def _shaped(self, picture: np.ndarray) -> np.ndarray:
+    def _resize(self, picture: np.ndarray) -> np.ndarray:
         size = self._square(picture.shape[1], picture.shape[0])
         if size != (picture.shape[1], picture.shape[0]):
             picture = cv2.resize(picture, size, interpolation=cv2.INTER_AREA)

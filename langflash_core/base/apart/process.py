@@ -61,7 +61,7 @@ def ask(reader: str, request: Mapping[str, Any], content: bytes = b"") -> Genera
     Raises:
         Refused: the file is no good. Ended: it broke, took too long, or wanted too much memory.
     """
-    worker = _asked(reader, request, content)
+    worker = _send_request(reader, request, content)
     try:
         try:
             part = worker.answer()
@@ -69,7 +69,7 @@ def ask(reader: str, request: Mapping[str, Any], content: bytes = b"") -> Genera
             if not worker.served:
                 raise
             worker.end()  # what it read before may have broken it
-            worker = _asked(reader, request, content, new=True)
+            worker = _send_request(reader, request, content, new=True)
             part = worker.answer()
         while part is not None:
             yield part
@@ -205,7 +205,7 @@ _idle: dict[str, list[_Worker]] = {}
 _lock = threading.Lock()
 
 
-def _asked(reader: str, request: Mapping[str, Any], content: bytes, new: bool = False) -> _Worker:
+def _send_request(reader: str, request: Mapping[str, Any], content: bytes, new: bool = False) -> _Worker:
     """A process that has the request: one that waits and served before, else a new one.
 
     Raises:

@@ -53,8 +53,8 @@ def serve(module: str, memory: int, seconds: int) -> None:
         _limit(memory)
         while True:
             watch.idle_since = time.monotonic()
-            head = json.loads(_read(requests, HEADER.unpack(_read(requests, HEADER.size))[0]))
-            content = _read(requests, head["size"])
+            head = json.loads(_read_exactly(requests, HEADER.unpack(_read_exactly(requests, HEADER.size))[0]))
+            content = _read_exactly(requests, head["size"])
             watch.idle_since = None
             _answer(reader, head, content, answers, seconds)
     except (EOFError, BrokenPipeError):
@@ -97,7 +97,7 @@ def _write(out: int, kind: str, facts: Mapping[str, Any], arrays: Mapping[str, A
             view = view[os.write(out, view) :]
 
 
-def _read(pipe: int, size: int) -> bytes:
+def _read_exactly(pipe: int, size: int) -> bytes:
     """Raises:
     EOFError: the other side is gone.
     """
@@ -159,11 +159,11 @@ class _Watch:
             since = self.idle_since
             if (since is not None and time.monotonic() - since > _IDLE) or os.getppid() != self._parent:
                 os._exit(0)
-            if _held() > self._memory:
+            if _peak_memory() > self._memory:
                 os._exit(OUT_OF_MEMORY)
 
 
-def _held() -> int:
+def _peak_memory() -> int:
     """Bytes that this process held at most; 0 where the kernel bounds them, or nothing tells."""
     if sys.platform == "linux":
         return 0

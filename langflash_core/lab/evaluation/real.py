@@ -32,7 +32,7 @@ from langflash_core.lab.evaluation.walk_scenes import wordless
 from langflash_core.lab.training.measures import nan_mean
 from langflash_core.pipeline import reconstruct
 from langflash_core.reconstruction.networks import Networks
-from langflash_core.surface.fused import fused
+from langflash_core.surface.fused import fuse_layers
 from langflash_core.types import Camera, Scene
 
 TIMES = 2
@@ -72,7 +72,7 @@ class _Walk:
     def camera(self, frame: Path) -> Camera:
         """At `TIMES` the network's size."""
         place = self.frames.index(frame)
-        return Camera(self.viewmats[place], self.Ks[place], *self.size).resized(*self.large)
+        return Camera(self.viewmats[place], self.Ks[place], *self.size).with_size(*self.large)
 
     @property
     def large(self) -> tuple[int, int]:
@@ -171,7 +171,7 @@ def _made(frames: Sequence[Path], walk: _Walk, bench: Bench) -> Scene:
         intrinsics=walk.lens,
         networks=bench.networks,
     )
-    return wordless(fused(scene) if bench.fused else scene)
+    return wordless(fuse_layers(scene) if bench.fused else scene)
 
 
 def _fewer(frame: Path, kept: Sequence[Path], walk: _Walk, bench: Bench) -> Scene | None:

@@ -275,7 +275,7 @@ def _scene_row(column: Column, own: Sequence[Truth], kept: Kept | None, bench: B
     if kept is not None:
         camera = kept.camera(scene, bench.render)
         for group, truth in (("between", kept.large), ("between_small", kept.small)):
-            groups[group] = rounded(_drawn(scene, camera.resized(*truth.size), truth, bench)[1])
+            groups[group] = rounded(_drawn(scene, camera.with_size(*truth.size), truth, bench)[1])
     once = {
         "gaussians": float(len(scene.gaussians)),
         "bytes": float(column.bytes),

@@ -42,7 +42,7 @@ from langflash_core.lab.training.losses import ssim_map
 from langflash_core.lab.training.measures import nan_mean, psnr
 from langflash_core.language.settings import ANSWERING
 from langflash_core.reconstruction.networks import Networks
-from langflash_core.scene.gaps import filled
+from langflash_core.scene.gaps import fill_gaps
 from langflash_core.types import Camera, Frame, Scene
 
 PERCEIVED = ("0", "20")
@@ -187,7 +187,7 @@ def _judged(
         both = shown & torch.from_numpy(depths > 0)
         numbers["psnr_covered"] = psnr(rgb[both], look.rgb[both]) if bool(both.any()) else math.nan
         numbers["ssim"] = float(ssim_map(rgb.clamp(0, 1), look.rgb)[shown].mean())
-        whole = filled(rgb, drawn.frame.alphas.cpu())
+        whole = fill_gaps(rgb, drawn.frame.alphas.cpu())
         numbers["psnr_filled"] = psnr(whole[shown], look.rgb[shown])
         if lpips is not None and look.group in PERCEIVED:
             numbers["lpips"] = lpips(rgb[None], look.rgb[None], shown[None])[0]

@@ -37,7 +37,7 @@ from langflash_core.lab.evaluation.walk_subjects import Walk
 from langflash_core.lab.photos.fitting import FittedPhoto
 from langflash_core.lab.training.measures import abs_rel, align_scale, delta1, nan_mean, psnr
 from langflash_core.language.settings import ANSWERING
-from langflash_core.scene.gaps import filled
+from langflash_core.scene.gaps import fill_gaps
 from langflash_core.types import Camera, Scene
 
 ALONE = "alone_"
@@ -193,7 +193,7 @@ def _own_psnr(made: Made, view: int, render: Render) -> float:
     scene = made.scene
     size = size_of(made.placed[view], scene.view_size)
     frame = render(scene, scene.camera(view, *size))
-    shown = filled(frame.rgb.cpu().float(), frame.alphas.cpu().float()).clamp(0, 1)
+    shown = fill_gaps(frame.rgb.cpu().float(), frame.alphas.cpu().float()).clamp(0, 1)
     return psnr(shown, _rgb(as_seen(made.placed[view], size)))
 
 

@@ -24,7 +24,7 @@ from langflash_core.lab.rooms import (
 )
 from langflash_core.lab.training.shards import NOTHING, Label, RoomRecord, quantise_tokens, write_shard
 from langflash_core.network.encoders.shared import Encoder
-from langflash_core.network.precision import mixed
+from langflash_core.network.precision import mixed_precision
 from langflash_core.types import LUMA
 
 log = logging.getLogger(__name__)
@@ -126,7 +126,7 @@ def _finished(record: RoomRecord, plan: CachePlan, encoder: Encoder | None) -> R
 def encode_pictures(encoder: Encoder, rgb: Tensor) -> Tensor:
     """Hook tokens (V, L, T, C) float32 of pictures (V, 3, H, W) uint8, in bfloat16 where that is quick."""
     images = rgb.to(next(encoder.parameters()).device).float()[None] / 255
-    with mixed(images.device):
+    with mixed_precision(images.device):
         hooks = encoder(images)[0].hooks
     return torch.stack([hook[0].float() for hook in hooks], 1).cpu()
 

@@ -12,7 +12,7 @@ from torch import Tensor, nn
 from torch.nn import functional as F
 
 from langflash_core.network.encoders.late import LateHalf, take_own
-from langflash_core.network.encoders.plain import NORM_EPS, Block, LayerScale, PlainViT, attended, through
+from langflash_core.network.encoders.plain import NORM_EPS, Block, LayerScale, PlainViT, attend, through
 from langflash_core.network.guided import GuidedDepthNet
 from langflash_core.network.presets import GuidedDepth
 
@@ -28,7 +28,7 @@ class SkippingBlock(Block):
     """A block whose branches leave out some pictures. Source: Huang et al. 2016 (stochastic depth)."""
 
     def forward(self, x: Tensor) -> Tensor:
-        values = attended(self.attn.qkv(self.norm1(x)), self.attn.heads)
+        values = attend(self.attn.qkv(self.norm1(x)), self.attn.heads)
         x = x + self._some(_scaled(self.attn.proj, self.ls1, values))
         hidden = F.gelu(self.mlp.fc1(self.norm2(x)))
         return x + self._some(_scaled(self.mlp.fc2, self.ls2, hidden))
@@ -97,7 +97,7 @@ def moments(learned: WholeLateHalf, network: GuidedDepthNet, pictures: Sequence[
         _, x = network.encoder(picture.to(device))
         for block, sums in zip(learned.each(), found, strict=True):
             read = block.norm1(x)
-            values = attended(block.attn.qkv(read), block.attn.heads)
+            values = attend(block.attn.qkv(read), block.attn.heads)
             x = x + block.ls1(block.attn.proj(values))
             wide = block.norm2(x)
             hidden = F.gelu(block.mlp.fc1(wide))

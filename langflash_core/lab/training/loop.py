@@ -35,7 +35,7 @@ from langflash_core.lab.training.states import (
     stage_parameters,
 )
 from langflash_core.network.model import LangFlashNet
-from langflash_core.network.precision import mixed
+from langflash_core.network.precision import mixed_precision
 
 log = logging.getLogger(__name__)
 
@@ -93,7 +93,7 @@ class LoopOptions:
     def computing(self) -> torch.autocast:
         """A context in which losses are computed in the precision asked for."""
         if self.precision == "auto":
-            return mixed(self.device)
+            return mixed_precision(self.device)
         kind, half = torch.device(self.device).type, self.precision == "bfloat16"
         return torch.autocast(kind, torch.bfloat16, enabled=half)
 

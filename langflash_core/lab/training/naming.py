@@ -57,7 +57,7 @@ def _thinned(room: PartBatch, generator: torch.Generator) -> PartBatch:
 def _renamed(network: LangFlashNet, room: PartBatch, generator: torch.Generator) -> Tensor:
     """Corrected atoms of one room, from inputs with noise and gaps."""
     namer = guided(network).namer
-    inputs = namer.standardised(room.atoms, room.looks, room.places)
+    inputs = namer.standardise(room.atoms, room.looks, room.places)
     inputs = inputs + NOISE * torch.randn(inputs.shape, generator=generator).to(inputs)
     count, looks = len(inputs), room.looks.shape[1]
     kept = torch.ones_like(inputs)

@@ -7,7 +7,7 @@ for itself give way to the group, also written apart ("night stand") or together
 
 from langflash_core.lab.photos import Name
 from langflash_core.lab.training.shards import Label
-from langflash_core.language.vocabulary import EVALUATED, OWN, taught
+from langflash_core.language.vocabulary import EVALUATED, OWN, is_trainable
 
 _KIN = """
 bedside table: night stand
@@ -50,7 +50,7 @@ _GROUP_OF = _kin()
 
 def may_be_taught(phrase: str) -> bool:
     """Whether training may say it: not kept for the evaluation, written in one word or in several."""
-    return taught(phrase) and taught(phrase.replace(" ", ""))
+    return is_trainable(phrase) and is_trainable(phrase.replace(" ", ""))
 
 
 def group_of(name: str) -> str:

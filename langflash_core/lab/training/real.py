@@ -44,7 +44,7 @@ from langflash_core.lab.training.states import LoopState, save_cut
 from langflash_core.lab.training.teacher import Names, Rows, Teacher, hand_over
 from langflash_core.network.guided import GuidedDepthNet
 from langflash_core.network.model import LangFlashNet
-from langflash_core.network.precision import mixed
+from langflash_core.network.precision import mixed_precision
 from langflash_core.network.prior import resize
 
 HEADS = ("language_head", "decoder", "depth_head")
@@ -277,7 +277,7 @@ class KeptPhotos:
                 view.rgb[None, None].to(self.device).float() / 255,
                 view.K[None, None].to(self.device),
             )
-            with mixed(self.device):
+            with mixed_precision(self.device):
                 tokens = network.encode(images, Ks)
                 features = network.language(tokens, images)[0].float().cpu()
                 depth = guided(network).monocular_depth(tokens, Ks).depths[0, 0].float().cpu()

@@ -28,7 +28,7 @@ from langflash_core.lab.training.stages.grouping import group_masks
 from langflash_core.lab.training.stages.pixels import nearest
 from langflash_core.lab.training.stages.stage import Words, frozen_tokens, guided, one_scene, tokens_of
 from langflash_core.network.model import LangFlashNet
-from langflash_core.network.precision import mixed
+from langflash_core.network.precision import mixed_precision
 
 Measure = Callable[[LangFlashNet, Any, Words], dict[str, float | Tensor]]
 
@@ -46,7 +46,7 @@ class Validator:
     def __call__(self, network: LangFlashNet) -> dict[str, float]:
         rows: list[dict[str, float | Tensor]] = []
         for batch in self.rooms.walk(4, views=self.views):
-            with mixed(self.device):
+            with mixed_precision(self.device):
                 rows.append(self.measure(network, batch.to(self.device), self.words))
         return _summary(rows)
 

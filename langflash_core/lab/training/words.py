@@ -14,7 +14,7 @@ import torch
 from torch import Tensor
 
 from langflash_core.lab.training.shards import Label
-from langflash_core.language.vocabulary import OWN, further_words, groups_of, is_name, taught
+from langflash_core.language.vocabulary import OWN, further_words, groups_of, is_name, is_trainable
 
 NAME_SHARE, GROUP_SHARE = 0.3, 0.3
 """How often an instance is called by its name or its group; further words take the rest."""
@@ -59,9 +59,9 @@ def names_of(label: Label) -> tuple[str, str, tuple[str, ...]]:
     A name that the evaluation keeps for itself gives way to the group; tags that do not name the
     thing ("ceiling" for a lamp) are dropped.
     """
-    name = label.name if taught(label.name) else label.group
+    name = label.name if is_trainable(label.name) else label.group
     words = (*(w for w in label.words if is_name(w, label.group)), *further_words(label.group))
-    kept = dict.fromkeys(word for word in words if taught(word) and word not in (name, label.group))
+    kept = dict.fromkeys(word for word in words if is_trainable(word) and word not in (name, label.group))
     return name, label.group, tuple(kept)
 
 

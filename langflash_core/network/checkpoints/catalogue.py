@@ -75,7 +75,7 @@ def trained_side(file: str) -> int:
     return next((entry.size for entry in CATALOGUE if file.endswith(entry.file)), 0)
 
 
-def published(name: str) -> Published:
+def find_published(name: str) -> Published:
     """The entry called `name`.
 
     Raises:

@@ -19,7 +19,7 @@ from langflash_core.errors import WeightsError
 from langflash_core.network.build import build_network, network_class
 from langflash_core.network.checkpoints.parts import TRAINED_HERE, write_part
 from langflash_core.network.checkpoints.store import assemble_network, finite
-from langflash_core.network.checkpoints.stored import Stored, dequantised, read_stored, weights_file
+from langflash_core.network.checkpoints.stored import Stored, dequantise_tensors, read_stored, weights_file
 from langflash_core.network.encoders.local import convert
 from langflash_core.network.encoders.others import OtherEyes
 from langflash_core.network.guided import GuidedDepthNet
@@ -64,7 +64,7 @@ def load_network(
         )
     with torch.device("meta"):  # no memory and no drawn numbers: it takes over those of the file
         network = build_network(PRESETS[preset]).eval()
-    load_strictly(network, completed(_tensors(stored.arrays)), path, assign=True)
+    load_strictly(network, complete_tensors(_tensors(stored.arrays)), path, assign=True)
     assert not any(buffer.is_meta for buffer in network.buffers())
     network.calibration = stored.header.get("calibration", {})
     return (network.use_bfloat16() if bfloat16 else network).to(device)
@@ -158,10 +158,10 @@ def read_weights(path: Path) -> tuple[dict[str, Shaped[Tensor, "..."]], dict]:
         WeightsError: there is none, or it is no safetensors file.
     """
     stored = read_stored(path)
-    return completed(_tensors(stored.arrays)), stored.header
+    return complete_tensors(_tensors(stored.arrays)), stored.header
 
 
-def completed(tensors: dict[str, Shaped[Tensor, "..."]]) -> dict[str, Shaped[Tensor, "..."]]:
+def complete_tensors(tensors: dict[str, Shaped[Tensor, "..."]]) -> dict[str, Shaped[Tensor, "..."]]:
     """Tensors of a whole network, also from before depth had a late half of its own, and from before these
     other networks were asked, which then say nothing."""
     heard = any(name.startswith("others.") for name in tensors)
@@ -215,7 +215,7 @@ def quantise(tensors: Mapping[str, Shaped[Tensor, "..."]]) -> dict[str, Shaped[T
 
 def dequantise(stored: Mapping[str, Shaped[Tensor, "..."]]) -> dict[str, Shaped[Tensor, "..."]]:
     """Float32 tensors of `quantise`."""
-    return _tensors(dequantised({key: value.numpy() for key, value in stored.items()}))
+    return _tensors(dequantise_tensors({key: value.numpy() for key, value in stored.items()}))
 
 
 def _tensors(arrays: Mapping[str, np.ndarray]) -> dict[str, Tensor]:

@@ -22,7 +22,7 @@ from torch import Tensor
 from langflash_core.errors import WeightsError
 from langflash_core.network.build import build_network
 from langflash_core.network.checkpoints.origins import COPY, LSEG, ORIGINS, Origin
-from langflash_core.network.checkpoints.pickles import read_pickle, stubbed
+from langflash_core.network.checkpoints.pickles import read_pickle, stub_name
 from langflash_core.network.presets import PointMaps, Preset
 
 _SHOWN = 6  # names of each kind of trouble in a message
@@ -88,13 +88,13 @@ def _state_dict(held: Any, path: Path) -> dict[str, Tensor]:
         if isinstance(held, Mapping) and isinstance(held.get(wrapper), Mapping):
             held = held[wrapper]
             break
-        if isinstance(held, Mapping) and (name := stubbed(held.get(wrapper))):
+        if isinstance(held, Mapping) and (name := stub_name(held.get(wrapper))):
             raise WeightsError(f"{path} is not a plain checkpoint{_wants(name)}; {_REMEDY}")
     if not isinstance(held, Mapping) or not held:
         raise WeightsError(f"{path} holds no table of tensors; {_REMEDY}")
     strange = [str(name) for name, value in held.items() if not isinstance(value, Tensor)]
     if strange:
-        raise WeightsError(f"{path} holds things that are no tensors ({_listed(strange)}); {_REMEDY}")
+        raise WeightsError(f"{path} holds things that are no tensors ({_list_names(strange)}); {_REMEDY}")
     return {str(name): value for name, value in held.items()}
 
 
@@ -124,7 +124,7 @@ def convert(state: Mapping[str, Shaped[Tensor, "..."]], preset: Preset, path: Pa
     """
     state = {name.removeprefix("net."): value for name, value in state.items()}
     origin = _without_copy(recognise(state, path), state)
-    wanted = _wanted(origin, preset)
+    wanted = _wanted_shapes(origin, preset)
     used = {origin.theirs(key)[0] for key in wanted}
     surplus = {name for name in state.keys() - used if not origin.ignores(name)}
     tolerated = sorted(filter(origin.tolerates, surplus))
@@ -159,19 +159,19 @@ def _without_copy(origin: Origin, state: Mapping[str, Tensor]) -> Origin:
 
 
 def _unread(names: list[str]) -> tuple[str, ...]:
-    told = f"{len(names)} tensors of it are read by nobody and left out ({_listed(names)})"
+    told = f"{len(names)} tensors of it are read by nobody and left out ({_list_names(names)})"
     return (told,) if names else ()
 
 
-def _wanted(origin: Origin, preset: Preset) -> dict[str, tuple[int, ...]]:
+def _wanted_shapes(origin: Origin, preset: Preset) -> dict[str, tuple[int, ...]]:
     """Our tensors that this kind of checkpoint fills, and their shapes."""
     with torch.device("meta"):
-        state = build_network(shaped(preset, origin.modules)).state_dict()
+        state = build_network(preset_for(preset, origin.modules)).state_dict()
     prefixes = tuple(f"{name}." for name in origin.modules)
     return {key: tuple(value.shape) for key, value in state.items() if key.startswith(prefixes)}
 
 
-def shaped(preset: Preset, modules: Iterable[str]) -> Preset:
+def preset_for(preset: Preset, modules: Iterable[str]) -> Preset:
     """The preset of a network that has these modules, copies for the grouping among them or not."""
     if not isinstance(preset, PointMaps):
         return preset
@@ -180,7 +180,7 @@ def shaped(preset: Preset, modules: Iterable[str]) -> Preset:
 
 def _refuse(problems: Mapping[str, list[str]], origin: Origin, path: Path) -> None:
     told = [
-        f"{len(set(names))} {kind} ({_listed(sorted(set(names)))})"
+        f"{len(set(names))} {kind} ({_list_names(sorted(set(names)))})"
         for kind, names in problems.items()
         if names
     ]
@@ -191,7 +191,7 @@ def _refuse(problems: Mapping[str, list[str]], origin: Origin, path: Path) -> No
         )
 
 
-def _listed(names: list[str]) -> str:
+def _list_names(names: list[str]) -> str:
     return ", ".join(names[:_SHOWN]) + (f" and {len(names) - _SHOWN} more" if len(names) > _SHOWN else "")
 
 

@@ -52,7 +52,7 @@ class Origin:
         return any(re.fullmatch(pattern, name) for pattern in self.tolerated)
 
 
-def _counted(pattern: str, form: str) -> Rule:
+def _counting_rule(pattern: str, form: str) -> Rule:
     """A rule whose first group is a number that counts from 1 on their side."""
     return pattern, lambda match: form.format(int(match[1]) + 1)
 
@@ -73,8 +73,8 @@ _FUSION: tuple[Rule, ...] = (
 _DPT: tuple[Rule, ...] = (
     (r"\.dpt\.project\.(\d)\.", r".dpt.act_postprocess.\1.0."),
     (r"\.dpt\.resize\.(\d)\.", r".dpt.act_postprocess.\1.1."),
-    _counted(r"\.dpt\.level\.(\d)\.", ".dpt.scratch.layer{}_rn."),
-    _counted(r"\.dpt\.fuse\.(\d)\.", ".dpt.scratch.refinenet{}."),
+    _counting_rule(r"\.dpt\.level\.(\d)\.", ".dpt.scratch.layer{}_rn."),
+    _counting_rule(r"\.dpt\.fuse\.(\d)\.", ".dpt.scratch.refinenet{}."),
     *_FUSION,
     (r"\.dpt\.shortcut\.", ".dpt.input_merger.0."),
 )
@@ -102,7 +102,7 @@ NOPOSPLAT = Origin(
         (r"\.cross\.out\.", ".cross_attn.proj."),
         (r"\.norm_memory\.", ".norm_y."),
         *_BLOCKS,
-        _counted(r"^point_heads\.(\d)\.(?:dpt\.)?", "encoder.downstream_head{}.dpt."),
+        _counting_rule(r"^point_heads\.(\d)\.(?:dpt\.)?", "encoder.downstream_head{}.dpt."),
         (r"^gaussian_heads\.0\.(?:dpt\.)?", "encoder.gaussian_param_head.dpt."),
         (r"^gaussian_heads\.1\.(?:dpt\.)?", "encoder.gaussian_param_head2.dpt."),
         *_DPT,
@@ -130,11 +130,11 @@ LSEG = Origin(
         (r"^language_head\.vit\.places$", "pretrained.model.pos_embed"),
         (r"^language_head\.vit\.", "pretrained.model."),
         *_BLOCKS,
-        _counted(r"^language_head\.readout\.(\d)\.", "pretrained.act_postprocess{}.0.project.0."),
-        _counted(r"^language_head\.project\.(\d)\.", "pretrained.act_postprocess{}.3."),
-        _counted(r"^language_head\.resize\.(\d)\.", "pretrained.act_postprocess{}.4."),
-        _counted(r"^language_head\.level\.(\d)\.", "scratch.layer{}_rn."),
-        _counted(r"^language_head\.fuse\.(\d)\.", "scratch.refinenet{}."),
+        _counting_rule(r"^language_head\.readout\.(\d)\.", "pretrained.act_postprocess{}.0.project.0."),
+        _counting_rule(r"^language_head\.project\.(\d)\.", "pretrained.act_postprocess{}.3."),
+        _counting_rule(r"^language_head\.resize\.(\d)\.", "pretrained.act_postprocess{}.4."),
+        _counting_rule(r"^language_head\.level\.(\d)\.", "scratch.layer{}_rn."),
+        _counting_rule(r"^language_head\.fuse\.(\d)\.", "scratch.refinenet{}."),
         (r"^language_head\.out\.", "scratch.head1."),
         *_FUSION,
         (r"(resConfUnit\d)\.norm(\d)\.", r"\1.bn\2."),
@@ -154,7 +154,7 @@ LANGFLASH = Origin(
     marker="query_pos.weight",
     modules=("scratch", "grouping", "grouping_encoder", "grouping_decoder"),
     rules=(
-        _counted(r"^scratch\.(\d)\.(?:dpt\.)?", "encoder.scratch_head{}.dpt."),
+        _counting_rule(r"^scratch\.(\d)\.(?:dpt\.)?", "encoder.scratch_head{}.dpt."),
         *_DPT,
         (r"^grouping\.patterns$", "query.weight"),
         (r"^grouping\.positions$", "query_pos.weight"),

@@ -64,7 +64,7 @@ def part_folder(preset: Preset) -> Path:
     return weights_folder() / preset.name
 
 
-def installed(preset: Preset) -> list[Part]:
+def installed_parts(preset: Preset) -> list[Part]:
     """Every part in the preset's folder, by file name."""
     return [read_part(path) for path in sorted(part_folder(preset).glob("*.safetensors"))]
 

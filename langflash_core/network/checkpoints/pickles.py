@@ -45,7 +45,7 @@ def read_pickle(path: Path) -> Any:
             return torch.load(path, map_location="cpu", weights_only=True, mmap=mapped)
 
 
-def stubbed(value: object) -> str:
+def stub_name(value: object) -> str:
     """What a stub, or an object of one, stands for; "" for anything else."""
     kind = value if isinstance(value, type) else type(value)
     return kind.named if issubclass(kind, Stub) else ""

@@ -10,7 +10,7 @@ from langflash_core.network.checkpoints.parts import (
     TRUNK,
     Part,
     fingerprint,
-    installed,
+    installed_parts,
     read_tensors,
     write_part,
 )
@@ -23,7 +23,7 @@ def settle(preset: Preset) -> tuple[str, ...]:
     Returns:
         what was found and what it costs, a sentence each.
     """
-    parts = installed(preset)
+    parts = installed_parts(preset)
     grouping = next((part for part in parts if "grouping" in part.modules), None)
     geometry = next((part for part in parts if set(TRUNK) <= set(part.modules)), None)
     if grouping is None or grouping is geometry:

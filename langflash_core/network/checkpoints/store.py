@@ -18,13 +18,13 @@ from langflash_core.base.resources import weights_folder
 from langflash_core.errors import WeightsError
 from langflash_core.network.build import build_network
 from langflash_core.network.checkpoints.catalogue import trained_side
-from langflash_core.network.checkpoints.importing import convert, read_checkpoint, shaped
+from langflash_core.network.checkpoints.importing import convert, preset_for, read_checkpoint
 from langflash_core.network.checkpoints.origins import COPY
 from langflash_core.network.checkpoints.parts import (
     REMEDY,
     TRUNK,
     Part,
-    installed,
+    installed_parts,
     part_folder,
     read_part,
     write_part,
@@ -85,7 +85,7 @@ def assemble_network(
     """
     sources = _sources(_parts(preset, weights))
     with torch.device("meta"):
-        network = build_network(_filtering(shaped(preset, sources), sources)).eval()
+        network = build_network(_filtering(preset_for(preset, sources), sources)).eval()
     if bfloat16:
         network.use_bfloat16()
     for name, part in sources.items():
@@ -113,7 +113,7 @@ def network_to_train(
     dropped = {*fresh, *(name for name in held if name.startswith(COPY) and "grouping" in fresh)}
     sources = {name: part for name, part in held.items() if name not in dropped}
     torch.manual_seed(seed)
-    shape = shaped(preset, sources)
+    shape = preset_for(preset, sources)
     network = build_network(replace(shape, mask_filter=None) if isinstance(shape, PointMaps) else shape)
     missing = [name for name in network.frozen if name not in sources]
     if missing:
@@ -135,7 +135,7 @@ def _filtering(preset: Preset, sources: dict[str, Part]) -> Preset:
 
 def _parts(preset: Preset, weights: Path | None) -> list[Part]:
     """What there is for a preset, in the order in which modules are looked for."""
-    parts = ([read_part(weights)] if weights is not None else []) + installed(preset)
+    parts = ([read_part(weights)] if weights is not None else []) + installed_parts(preset)
     for part in parts:
         _check_preset(part, preset)
     return parts
@@ -197,7 +197,7 @@ def verify_part(path: Path, preset: Preset) -> None:
     """
     modules = read_part(path).modules
     with torch.device("meta"):
-        network = build_network(shaped(preset, modules))
+        network = build_network(preset_for(preset, modules))
     for name in modules:
         _fill(network, name, path, "cpu")
 

@@ -53,7 +53,7 @@ def read_header(path: Path) -> dict:
     Raises:
         WeightsError: there is none, or it is no safetensors file.
     """
-    with _opened(path) as file:
+    with _open_safetensors(path) as file:
         return json.loads((file.metadata() or {}).get("langflash", "{}"))
 
 
@@ -64,16 +64,16 @@ def read_stored(path: Path) -> Stored:
         WeightsError: there is none, it is no safetensors file, or not the one that was shipped.
     """
     check_shipped(path)
-    with _opened(path) as file:
+    with _open_safetensors(path) as file:
         raw = {key: _array(file, path, key) for key in file.keys()}  # noqa: SIM118 (no mapping)
         header = json.loads((file.metadata() or {}).get("langflash", "{}"))
-    return Stored(dequantised(raw), header)
+    return Stored(dequantise_tensors(raw), header)
 
 
-def dequantised(raw: Mapping[str, Shaped[np.ndarray, "..."]]) -> dict[str, Shaped[np.ndarray, "..."]]:
+def dequantise_tensors(raw: Mapping[str, Shaped[np.ndarray, "..."]]) -> dict[str, Shaped[np.ndarray, "..."]]:
     """Aligned float32 arrays of what is stored: int8 rows times their scales, the rest as it is."""
     kept = {key: value for key, value in raw.items() if not _is_scale(key, raw)}
-    arrays = aligned({key: value.shape for key, value in kept.items()})
+    arrays = allocate_aligned({key: value.shape for key, value in kept.items()})
     for key, value in kept.items():
         if value.dtype == np.int8:
             scale = raw[key + SCALE].astype(np.float32).reshape(-1, *[1] * (value.ndim - 1))
@@ -83,7 +83,7 @@ def dequantised(raw: Mapping[str, Shaped[np.ndarray, "..."]]) -> dict[str, Shape
     return arrays
 
 
-def aligned(shapes: Mapping[str, tuple[int, ...]]) -> dict[str, Shaped[np.ndarray, "..."]]:
+def allocate_aligned(shapes: Mapping[str, tuple[int, ...]]) -> dict[str, Shaped[np.ndarray, "..."]]:
     """Float32 arrays of these shapes, not yet filled, one after the other in one piece of memory."""
     step = ALIGNMENT // np.dtype(np.float32).itemsize
     sizes = {key: math.prod(shape) for key, shape in shapes.items()}
@@ -101,7 +101,7 @@ def _is_scale(key: str, raw: Mapping[str, np.ndarray]) -> bool:
 
 
 @contextmanager
-def _opened(path: Path) -> Iterator[Any]:
+def _open_safetensors(path: Path) -> Iterator[Any]:
     try:
         with safe_open(str(path), framework="np") as file:
             yield file

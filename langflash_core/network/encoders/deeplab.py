@@ -46,7 +46,7 @@ class Inverted(nn.Module):
         """What the last layer reads."""
         if self.expand is not None:
             x = F.relu6(self.expand(x))
-        return F.relu6(self.depthwise(framed(x, self.depthwise)))
+        return F.relu6(self.depthwise(pad_frame(x, self.depthwise)))
 
     def outside(
         self, inside: Float[Tensor, "n D _ _"], x: Float[Tensor, "n C h w"]
@@ -91,7 +91,7 @@ class DeepLab(nn.Module):
     def forward(self, pictures: Float[Tensor, "n 3 H W"]) -> Float[Tensor, "n 256 h w"]:
         """Maps (n, 256, h, w), 0 or more, about 1, of pictures (n, 3, H, W) in [0, 1]."""
         x = (2 * pictures - 1).contiguous(memory_format=torch.channels_last)  # a third quicker
-        x = F.relu6(self.stem(framed(x, self.stem)))
+        x = F.relu6(self.stem(pad_frame(x, self.stem)))
         fine = x
         for place, block in enumerate(self.blocks):
             assert isinstance(block, Inverted)
@@ -105,7 +105,7 @@ class DeepLab(nn.Module):
         return self.last(torch.cat((deep, fine), 1)) / LARGE
 
 
-def framed(x: Float[Tensor, "n C h w"], layer: nn.Conv2d) -> Float[Tensor, "n C _ _"]:
+def pad_frame(x: Float[Tensor, "n C h w"], layer: nn.Conv2d) -> Float[Tensor, "n C _ _"]:
     """x with zeros around it, so that what a square layer gives is as large as its stride allows; a row that
     is over comes last, as TensorFlow has it."""
     stride, reach = layer.stride[0], layer.dilation[0] * (layer.kernel_size[0] - 1)

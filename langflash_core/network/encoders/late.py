@@ -13,7 +13,7 @@ from jaxtyping import Float
 from torch import Tensor, nn
 from torch.nn import functional as F
 
-from langflash_core.network.encoders.plain import NORM_EPS, Block, LayerScale, PlainViT, attended
+from langflash_core.network.encoders.plain import NORM_EPS, Block, LayerScale, PlainViT, attend
 from langflash_core.network.encoders.shared import Tokens
 from langflash_core.network.presets import GuidedDepth
 
@@ -107,7 +107,7 @@ class CorrectedBlock(nn.Module):
         ]
 
     def forward(self, x: Float[Tensor, "N T C"], base: Block) -> Float[Tensor, "N T C"]:
-        values = attended(self.qkv(self.norm1(x), base.attn.qkv), self.heads)
+        values = attend(self.qkv(self.norm1(x), base.attn.qkv), self.heads)
         x = x + self.ls1(self.proj(values, base.attn.proj))
         hidden = F.gelu(self.fc1(self.norm2(x), base.mlp.fc1))
         return x + self.ls2(self.fc2(hidden, base.mlp.fc2))

@@ -8,7 +8,7 @@ from jaxtyping import Float
 from torch import Tensor, nn
 from torch.nn import functional as F
 
-from langflash_core.network.encoders.vit import ClassTokenEncoder, centred
+from langflash_core.network.encoders.vit import ClassTokenEncoder, centre_images
 from langflash_core.network.layers.dpt import double
 from langflash_core.network.presets import PointMaps
 
@@ -76,7 +76,12 @@ class LSeg(nn.Module):
         levels = [
             level(resize(project(self._map(tokens, readout, grid))))
             for tokens, readout, project, resize, level in zip(
-                self.vit(centred(images)), self.readout, self.project, self.resize, self.level, strict=True
+                self.vit(centre_images(images)),
+                self.readout,
+                self.project,
+                self.resize,
+                self.level,
+                strict=True,
             )
         ]
         path = self.fuse[3](levels[3])

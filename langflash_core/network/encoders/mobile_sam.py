@@ -95,14 +95,14 @@ class MobileSamEncoder(nn.Module):
         size = self.fitting(*images.shape[-2:])
         small = F.interpolate(images, size, mode="bilinear", antialias=True)
         rows, columns = (-(-length // STRIDE) for length in size)
-        return self(self.squared(small))[..., :rows, :columns]
+        return self(self.pad_to_square(small))[..., :rows, :columns]
 
     def fitting(self, height: int, width: int) -> tuple[int, int]:
         """Height and width of a photo whose longer side is the encoder's."""
         scale = self.side / max(height, width)
         return max(1, round(height * scale)), max(1, round(width * scale))
 
-    def squared(self, small: Float[Tensor, "n 3 h w"]) -> Float[Tensor, "n 3 H W"]:
+    def pad_to_square(self, small: Float[Tensor, "n 3 h w"]) -> Float[Tensor, "n 3 H W"]:
         """Squares (n, 3, side, side) of photos (n, 3, h, w) of `fitting` size, in [0, 1].
 
         Normalised, and zero where nothing is, as SAM has them.
@@ -129,20 +129,20 @@ def load_mobile_sam_encoder(path: Path, side: int = SIDE, device: str = "cpu") -
     """
     stored = own_names(read_checkpoint(path))
     state = {name.removeprefix(PREFIX): value for name, value in stored.items() if name.startswith(PREFIX)}
-    return filled(MobileSamEncoder(side), state, path, "MobileSAM's encoder").to(device)
+    return load_frozen(MobileSamEncoder(side), state, path, "MobileSAM's encoder").to(device)
 
 
 def own_names(published: Mapping[str, Shaped[Tensor, "..."]]) -> dict[str, Shaped[Tensor, "..."]]:
     """The tensors of a file of MobileSAM, those of the encoder by the names they have here, in single
     precision; without the classifier's, which nobody asks."""
     return {
-        _named(name): value.float() if value.is_floating_point() else value
+        _rename_tensor(name): value.float() if value.is_floating_point() else value
         for name, value in published.items()
         if not name.startswith(_UNUSED)
     }
 
 
-def filled(network: Module, state: Mapping[str, Shaped[Tensor, "..."]], path: Path, what: str) -> Module:
+def load_frozen(network: Module, state: Mapping[str, Shaped[Tensor, "..."]], path: Path, what: str) -> Module:
     """The network, frozen, with exactly these tensors, which are of a file.
 
     Raises:
@@ -158,7 +158,7 @@ def filled(network: Module, state: Mapping[str, Shaped[Tensor, "..."]], path: Pa
     return network.requires_grad_(False).eval()
 
 
-def _named(published: str) -> str:
+def _rename_tensor(published: str) -> str:
     if not published.startswith(PREFIX):
         return published
     name = published.removeprefix(PREFIX)

@@ -15,7 +15,7 @@ from jaxtyping import Float
 from torch import Tensor, nn
 from torch.nn import functional as F
 
-from langflash_core.network.encoders.deeplab import framed
+from langflash_core.network.encoders.deeplab import pad_frame
 
 CHANNELS = 320
 """Of the maps that its decoder reads: 128 of context and 192 of detail."""
@@ -49,7 +49,7 @@ class Block(nn.Module):
     ) -> tuple[Float[Tensor, "n D _ _"], Float[Tensor, "n _ _ _"]]:
         """What it holds inside and what it gives."""
         inside = F.relu(self.expand(x))
-        inside = F.relu(self.depthwise(framed(inside, self.depthwise)))
+        inside = F.relu(self.depthwise(pad_frame(inside, self.depthwise)))
         y = self.project(inside)
         return inside, x + y if self.adds else y
 
@@ -78,7 +78,7 @@ class Context(nn.Module):
         means = F.avg_pool2d(x, self.window, ceil_mode=True)
         close, wide = means.chunk(2, 1)
         read = torch.cat((self.close(close), self.wide(wide)), 1)
-        return enlarged(read, self.window, (x.shape[-2], x.shape[-1]))
+        return enlarge(read, self.window, (x.shape[-2], x.shape[-1]))
 
 
 class Mosaic(nn.Module):
@@ -99,17 +99,17 @@ class Mosaic(nn.Module):
     def forward(self, pictures: Float[Tensor, "n 3 H W"]) -> Float[Tensor, "n 320 h w"]:
         """Maps (n, 320, h, w), 0 or more, of pictures (n, 3, H, W) in [0, 1]."""
         x = (2 * pictures - 1).contiguous(memory_format=torch.channels_last)
-        x, detail = F.relu(self.stem(framed(x, self.stem))), pictures
+        x, detail = F.relu(self.stem(pad_frame(x, self.stem))), pictures
         for place, block in enumerate(self.blocks):
             inside, x = block(x)
             if place == _DETAIL:
                 detail = inside
         deep = F.relu(self.deep(x))
         around = F.relu(self.both(torch.cat([*(read(deep) for read in self.contexts), deep], 1)))
-        return torch.cat((enlarged(around, 2, (detail.shape[-2], detail.shape[-1])), detail), 1)
+        return torch.cat((enlarge(around, 2, (detail.shape[-2], detail.shape[-1])), detail), 1)
 
 
-def enlarged(x: Float[Tensor, "n C h w"], times: int, size: tuple[int, int]) -> Float[Tensor, "n C H W"]:
+def enlarge(x: Float[Tensor, "n C h w"], times: int, size: tuple[int, int]) -> Float[Tensor, "n C H W"]:
     """x so many times as large, cut to `size`: what stands at i comes to `times` i, as TensorFlow had it at
     first; behind the last row and column these go on."""
     height, width = (times * length + 1 for length in x.shape[-2:])

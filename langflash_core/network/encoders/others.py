@@ -31,14 +31,14 @@ class OtherEyes(nn.Module):
 
     def forward(self, pictures: Float[Tensor, "n 3 H W"]) -> Float[Tensor, "n C h w"]:
         """Maps (n, 576, h, w), 0 or more, of pictures (n, 3, H, W) in [0, 1]."""
-        own = seen(pictures)
+        own = resize_pictures(pictures)
         first = self.deeplab(own)
         size = (first.shape[-2], first.shape[-1])
         second = F.interpolate(self.mosaic(own), size, mode="bilinear", align_corners=False)
         return torch.cat((first, second), 1)
 
 
-def seen(pictures: Float[Tensor, "n 3 H W"]) -> Float[Tensor, "n 3 _ _"]:
+def resize_pictures(pictures: Float[Tensor, "n 3 H W"]) -> Float[Tensor, "n 3 _ _"]:
     """Pictures (n, 3, H, W) as they are seen: the longer side is `SIDE`."""
     height, width = pictures.shape[-2:]
     scale = SIDE / max(height, width)

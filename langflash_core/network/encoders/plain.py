@@ -10,7 +10,7 @@ from jaxtyping import Float
 from torch import Tensor, nn
 from torch.nn import functional as F
 
-from langflash_core.network.layers.draws import drawn
+from langflash_core.network.layers.draws import draw_normal
 from langflash_core.network.presets import GuidedDepth
 
 NORM_EPS = 1e-6
@@ -32,7 +32,7 @@ class PlainViT(nn.Module):
         dim, heads = preset.encoder_dim, preset.encoder_heads
         self.trained_grid = preset.trained_grid
         self.cls_token = nn.Parameter(torch.zeros(1, 1, dim))
-        self.pos_embed = nn.Parameter(drawn(1, preset.trained_grid**2 + 1, dim, std=0.02))
+        self.pos_embed = nn.Parameter(draw_normal(1, preset.trained_grid**2 + 1, dim, std=0.02))
         self.patch_embed = _Patches(dim, preset.patch)
         self.blocks = nn.ModuleList(Block(dim, heads) for _ in range(preset.encoder_depth))
         self.norm = nn.LayerNorm(dim, NORM_EPS)
@@ -57,7 +57,7 @@ class PlainViT(nn.Module):
         return torch.cat((self.pos_embed[:, :1], resized.permute(0, 2, 3, 1).flatten(1, 2)), 1)
 
 
-def attended(qkv: Float[Tensor, "n T D"], heads: int) -> Float[Tensor, "n T C"]:
+def attend(qkv: Float[Tensor, "n T D"], heads: int) -> Float[Tensor, "n T C"]:
     """Values (n, T, C) that every head gathers; qkv (n, T, 3 C): queries, keys and values."""
     q, k, v = qkv.unflatten(-1, (3, heads, -1)).permute(2, 0, 3, 1, 4)
     return F.scaled_dot_product_attention(q, k, v).transpose(1, 2).flatten(2)
@@ -94,7 +94,7 @@ class _Attention(nn.Module):
         self.qkv, self.proj = nn.Linear(dim, 3 * dim), nn.Linear(dim, dim)
 
     def forward(self, x: Tensor) -> Tensor:
-        return self.proj(attended(self.qkv(x), self.heads))
+        return self.proj(attend(self.qkv(x), self.heads))
 
 
 class _MLP(nn.Module):

@@ -104,12 +104,12 @@ class Encoder(nn.Module):
         mean, std = (images.new_tensor(values)[:, None, None] for values in (_MEAN, _STD))
         flat = (images.flatten(0, 1) - mean) / std
         states = self.vit.states(flat, self.hook_blocks)
-        hooks = tuple(unflattened(self.vit.norm(x)[:, 1:], images) for x in states)
+        hooks = tuple(unflatten_views(self.vit.norm(x)[:, 1:], images) for x in states)
         grid = (images.shape[-2] // self.patch, images.shape[-1] // self.patch)
         return Tokens(hooks, grid), states[1]
 
 
-def unflattened(
+def unflatten_views(
     tokens: Float[Tensor, "n ..."], images: Float[Tensor, "B V _ H W"]
 ) -> Float[Tensor, "B V ..."]:
     """Tokens (B*V, ...) of images (B, V, 3, H, W), as (B, V, ...)."""

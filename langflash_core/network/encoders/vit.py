@@ -13,7 +13,7 @@ from langflash_core.network.layers.decoder import normalised_intrinsics
 from langflash_core.network.presets import LSegSizes, PointMaps
 
 
-def centred(images: Float[Tensor, "*n 3 H W"]) -> Float[Tensor, "*n 3 H W"]:
+def centre_images(images: Float[Tensor, "*n 3 H W"]) -> Float[Tensor, "*n 3 H W"]:
     """Images in [0, 1] -> [-1, 1], as all published networks of this preset read them."""
     return images * 2 - 1
 
@@ -41,7 +41,7 @@ class RotaryEncoder(nn.Module):
     def forward(self, images: Float[Tensor, "B V 3 H W"], Ks: Float[Tensor, "B V 3 3"]) -> Tensor:
         """(B, V, h*w + 1, C) from images (B, V, 3, H, W) in [0, 1] and Ks (B, V, 3, 3), pixels."""
         height, width = images.shape[-2:]
-        patches = self.patch(centred(images.flatten(0, 1))).flatten(2).transpose(1, 2)
+        patches = self.patch(centre_images(images.flatten(0, 1))).flatten(2).transpose(1, 2)
         camera = self.intrinsics(normalised_intrinsics(Ks, width, height)).flatten(0, 1)
         x = torch.cat((patches, camera[:, None]), 1)
         grid = (height // self.patch_size, width // self.patch_size)

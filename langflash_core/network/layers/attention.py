@@ -57,7 +57,7 @@ class Attention(nn.Module):
     ) -> Float[Tensor, "B n C"]:
         """(B, n, C) from queries (B, n, C), keys and values (B, m, C)."""
         own, of_memory = codes if codes is not None else (None, None)
-        return self.gathered(query, self.memory(key, value, of_memory), own)
+        return self.gather_values(query, self.memory(key, value, of_memory), own)
 
     def memory(
         self,
@@ -69,7 +69,7 @@ class Attention(nn.Module):
         k, v = self._of_heads(self.key(key)), self._of_heads(self.value(value))
         return k if code is None else rotate(k, code), v
 
-    def gathered(
+    def gather_values(
         self, query: Float[Tensor, "B n C"], memory: Memory, code: Float[Tensor, "2 n d"] | None = None
     ) -> Float[Tensor, "B n C"]:
         """(B, n, C) from queries (B, n, C) and a memory."""
@@ -136,7 +136,7 @@ class CrossBlock(nn.Module):
     ) -> Float[Tensor, "B n C"]:
         x = self.norm1(tokens)
         tokens = tokens + self.attn(x, x, x, (code, code))
-        tokens = tokens + self.cross.gathered(self.norm2(tokens), memory, code)
+        tokens = tokens + self.cross.gather_values(self.norm2(tokens), memory, code)
         return tokens + self.mlp(self.norm3(tokens))
 
     def memory(self, tokens: Float[Tensor, "B m C"], code: Float[Tensor, "2 m d"]) -> Memory:

@@ -10,7 +10,7 @@ from torch import Tensor, nn
 from torch.nn import functional as F
 
 from langflash_core.geometry.quaternions import unit_quats
-from langflash_core.network.encoders.vit import centred
+from langflash_core.network.encoders.vit import centre_images
 from langflash_core.network.layers.dpt import DPT, double
 from langflash_core.network.presets import PointMaps
 from langflash_core.network.settings import POINT_HEADS
@@ -62,7 +62,7 @@ class ParameterHead(nn.Module):
 
     def forward(self, levels: Levels, images: Float[Tensor, "n 3 H W"]) -> Float[Tensor, "n R H W"]:
         wide = double(self.dpt(levels).path_1, align_corners=True)
-        return self.out(F.relu(self.mix(wide + F.relu(self.shortcut(centred(images))))))
+        return self.out(F.relu(self.mix(wide + F.relu(self.shortcut(centre_images(images))))))
 
 
 class PerView(nn.ModuleList):
@@ -81,7 +81,7 @@ class PerView(nn.ModuleList):
         return torch.stack(answers, 1)
 
 
-def activated(raw: Float[Tensor, "V R H W"], points: Float[Tensor, "V 3 H W"]) -> Gaussians:
+def activate_gaussians(raw: Float[Tensor, "V R H W"], points: Float[Tensor, "V 3 H W"]) -> Gaussians:
     """Gaussians of one scene, N = V*H*W in the order (v h w).
 
     Channels: opacity, three scales, quaternion xyzw, harmonics colour by colour.

@@ -26,7 +26,7 @@ class Resection:
     share: float
 
     @property
-    def trusted(self) -> bool:
+    def is_trusted(self) -> bool:
         return self.share >= RESECTION.min_share
 
 

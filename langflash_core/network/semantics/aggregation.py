@@ -42,7 +42,7 @@ def averaged_atoms(
     return F.normalize(average_atoms(weights, features, eps), dim=-1)
 
 
-def _pooled(features: Tensor, side: int) -> Tensor:
+def _average_pool(features: Tensor, side: int) -> Tensor:
     """Means (B, V, C, h / side, w / side) of features (B, V, C, h, w)."""
     side = min(side, *features.shape[-2:])
     return F.avg_pool2d(features.flatten(0, 1), side).unflatten(0, features.shape[:2])
@@ -74,7 +74,7 @@ class Aggregation(nn.Module):
         """
         initial = F.normalize(average_atoms(weights, features, self.eps), dim=-1)
         side = 2 * math.ceil((features.shape[1] / _CLOSELY) ** 0.5)
-        memory = in_groups(lambda some: _pooled(some.float(), side), features, dim=1)
+        memory = in_groups(lambda some: _average_pool(some.float(), side), features, dim=1)
         memory = memory.permute(0, 1, 3, 4, 2).flatten(1, 3)  # (B, V*h*w/4, C)
         memory = self.memory(memory * memory.shape[-1] ** 0.5)
         queries = self.embed(initial * initial.shape[-1] ** 0.5)

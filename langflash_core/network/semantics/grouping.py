@@ -16,7 +16,7 @@ from torch.nn import functional as F
 from langflash_core.network.encoders.shared import Tokens, tokens_to_maps
 from langflash_core.network.layers.attention import MLP, QueryBlock
 from langflash_core.network.layers.dpt import DPT
-from langflash_core.network.layers.draws import drawn
+from langflash_core.network.layers.draws import draw_normal
 from langflash_core.network.presets import Preset
 from langflash_core.network.prior import resize
 
@@ -71,8 +71,8 @@ class SemanticGrouping(nn.Module):
     def __init__(self, preset: Preset):
         super().__init__()
         dim, f = preset.grouping_dim, preset.dpt_feature
-        self.patterns = nn.Parameter(drawn(preset.num_queries, dim))
-        self.positions = nn.Parameter(drawn(preset.num_queries, dim))
+        self.patterns = nn.Parameter(draw_normal(preset.num_queries, dim))
+        self.positions = nn.Parameter(draw_normal(preset.num_queries, dim))
         self.memories = nn.ModuleList(nn.Conv2d(f, dim, 1) for _ in range(3))
         self.layers = nn.ModuleList(
             QueryBlock(dim, preset.grouping_heads) for _ in range(preset.grouping_layers)
@@ -98,7 +98,7 @@ class SemanticGrouping(nn.Module):
             code = sinusoid(memory.shape[1], memory.shape[2], like=memory)
             for layer in self.layers[scale * per_scale : (scale + 1) * per_scale]:
                 queries = layer(queries, memory, self.positions, code)
-            answers.append(self._read(queries, finest.unflatten(0, (batch, num_views))))
+            answers.append(self._read_groups(queries, finest.unflatten(0, (batch, num_views))))
         return tuple(answers)
 
     def of_many(self, memories: Sequence[tuple[Float[Tensor, "_ _ _ _"], ...]]) -> Float[Tensor, "1 N d"]:
@@ -111,12 +111,12 @@ class SemanticGrouping(nn.Module):
         per_scale = len(self.layers) // len(self.memories)
         for number, layer in enumerate(self.layers):
             scale = number // per_scale
-            codes = self._coded(self.memories[scale], [maps[scale] for maps in memories])
+            codes = self._encode_memories(self.memories[scale], [maps[scale] for maps in memories])
             queries = cast(QueryBlock, layer).in_turn(queries, codes, self.positions)
         return queries
 
     @staticmethod
-    def _coded(project: nn.Module, groups: Sequence[Tensor]) -> Iterator[tuple[Tensor, Tensor]]:
+    def _encode_memories(project: nn.Module, groups: Sequence[Tensor]) -> Iterator[tuple[Tensor, Tensor]]:
         """Memories (1, m, d) of groups of maps (v, f, h, w), and the codes of their running positions."""
         start = 0
         for maps in groups:
@@ -126,9 +126,9 @@ class SemanticGrouping(nn.Module):
 
     def masks(self, queries: Float[Tensor, "1 N d"], finest: Float[Tensor, "n C h w"]) -> Groups:
         """What the queries (1, N, d) answer in some views, whose finest maps are (v, f, h, w)."""
-        return self._read(queries, finest[None])
+        return self._read_groups(queries, finest[None])
 
-    def _read(self, queries: Tensor, finest: Tensor) -> Groups:
+    def _read_groups(self, queries: Tensor, finest: Tensor) -> Groups:
         x = self.norm(queries)
         logits = torch.einsum("bnf,bvfhw->bvnhw", self.mask_mlp(x), finest) / finest.shape[2] ** 0.5
         return Groups(logits.float(), self.existence(x)[..., 0].float())

@@ -18,7 +18,7 @@ from torch.nn import functional as F
 from langflash_core.network.model import Geometry
 from langflash_core.network.presets import MaskFilter
 from langflash_core.network.semantics.grouping import Groups
-from langflash_core.network.semantics.residual import filtered
+from langflash_core.network.semantics.residual import filter_queries
 from langflash_core.network.semantics.settings import LIFTING
 from langflash_core.rig.projected import project_points
 
@@ -37,9 +37,9 @@ def lifted_weights(
         geometry: of the same photos. Ks: (V, 3, 3) pixels. most: K at most.
     """
     _, height, width = geometry.depths.shape
-    labels, counts = _painted(segments, (height, width))
+    labels, counts = _paint_labels(segments, (height, width))
     labels = labels.to(geometry.depths.device)
-    groups = _joined(_shares(labels, sum(counts), geometry, Ks), counts)
+    groups = _join_masks(_shares(labels, sum(counts), geometry, Ks), counts)
     ids = F.pad(groups, (0, 1), value=-1).to(labels.device)[labels]  # no mask stays -1
     sizes = torch.bincount(ids[ids >= 0].flatten(), minlength=len(groups))
     order = sizes.argsort(descending=True, stable=True)[: most - 1]
@@ -52,12 +52,12 @@ def lifted_weights(
     return F.avg_pool2d(hard, LIFTING.soft, stride=1, padding=LIFTING.soft // 2, count_include_pad=False)
 
 
-def _painted(segments: Sequence[Groups], size: tuple[int, int]) -> tuple[Tensor, list[int]]:
+def _paint_labels(segments: Sequence[Groups], size: tuple[int, int]) -> tuple[Tensor, list[int]]:
     """Labels (V, H, W), -1 where no mask is, running over all views; how many masks each view has."""
     pictures, counts = [], []
     for found in segments:
         picture = torch.full(size, -1, dtype=torch.long)
-        masks = found.mask_logits[0, 0, filtered(found, SURE)].cpu() > 0
+        masks = found.mask_logits[0, 0, filter_queries(found, SURE)].cpu() > 0
         for number, index in enumerate(masks.flatten(1).sum(1).argsort(descending=True, stable=True)):
             picture[masks[index]] = sum(counts) + number
         pictures.append(picture)
@@ -96,7 +96,7 @@ def _looked_up(points: Tensor, geometry: Geometry, Ks: Tensor, view: int) -> tup
     return seen[same], place[same]
 
 
-def _joined(shares: dict[tuple[int, int], float], counts: list[int]) -> Tensor:
+def _join_masks(shares: dict[tuple[int, int], float], counts: list[int]) -> Tensor:
     """A group for every mask, (sum of counts,): the surest pairs first, one mask of a view in a group."""
     views = [view for view, count in enumerate(counts) for _ in range(count)]
     members = {mask: {mask} for mask in range(len(views))}

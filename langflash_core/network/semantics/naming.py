@@ -136,14 +136,14 @@ class PartNamer(nn.Module):
         nn.init.zeros_(self.out.weight)
         nn.init.zeros_(self.out.bias)
 
-    def standardised(
+    def standardise(
         self, atoms: Float[Tensor, "K C"], looks: Float[Tensor, "K D"], places: Float[Tensor, "K p"]
     ) -> Float[Tensor, "K E"]:
         """What the layers read, (K, inputs)."""
         return (torch.cat((looks, places, atoms), -1) - self.mean) / self.std
 
     def context(self, inputs: Float[Tensor, "n C"]) -> Float[Tensor, "n D"]:
-        """What each part's correction is read from, (K, naming_dim); inputs: `standardised`."""
+        """What each part's correction is read from, (K, naming_dim); inputs: `standardise`."""
         parts = self.embed(inputs)[None]
         for block in self.blocks:
             parts = block(parts)
@@ -157,5 +157,5 @@ class PartNamer(nn.Module):
         Args:
             atoms: of the aggregation, (K, C). looks: of `describe`. places: of `places`.
         """
-        change = self.out(self.context(self.standardised(atoms, looks, places)))
+        change = self.out(self.context(self.standardise(atoms, looks, places)))
         return F.normalize(atoms + change.float(), dim=-1)

@@ -40,7 +40,7 @@ class Outlines:
         self.model = model
 
     @staticmethod
-    def installed(device: str, side: int = OUTLINING.seen) -> "Outlines":
+    def load_installed(device: str, side: int = OUTLINING.seen) -> "Outlines":
         """With the weights in the user's folder.
 
         Raises:
@@ -76,11 +76,13 @@ class Outlines:
         logits, same = torch.zeros_like(weights), torch.zeros(len(weights))
         for start in range(0, len(asked), OUTLINING.at_once):
             groups = asked[start : start + OUTLINING.at_once]
-            found, agree = self._asked(looked, np.stack([labels == k for k in groups]), weights.shape[1:])
+            found, agree = self._best_masks(
+                looked, np.stack([labels == k for k in groups]), weights.shape[1:]
+            )
             logits[groups], same[groups] = found, torch.from_numpy(agree).float()
-        return outlined(weights, logits, same)
+        return apply_outlines(weights, logits, same)
 
-    def _asked(
+    def _best_masks(
         self, looked: Looked, rough: Bool[np.ndarray, "n h w"], size: Sequence[int]
     ) -> tuple[Float[Tensor, "n H W"], Float64[np.ndarray, " n"]]:
         """Of the answers to each rough mask the one that is most like it: logits, and their IoU."""
@@ -96,7 +98,7 @@ class Outlines:
         return small, agree.max(1)
 
 
-def outlined(
+def apply_outlines(
     weights: Float[Tensor, "K H W"], logits: Float[Tensor, "K H W"], same: Float[Tensor, " K"]
 ) -> Float[Tensor, "K H W"]:
     """softmax_k(log w_k + l_k), l cut at +-`OUTLINING.sure`; groups whose answer is another thing keep l = 0.

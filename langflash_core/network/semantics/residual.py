@@ -13,10 +13,10 @@ from torch import Tensor, nn
 from torch.nn import functional as F
 
 from langflash_core.network.encoders.shared import Tokens
-from langflash_core.network.encoders.vit import centred
+from langflash_core.network.encoders.vit import centre_images
 from langflash_core.network.layers.attention import MLP, QueryBlock
 from langflash_core.network.layers.dpt import DPT, double
-from langflash_core.network.layers.draws import drawn
+from langflash_core.network.layers.draws import draw_normal
 from langflash_core.network.presets import MaskFilter, PointMaps
 from langflash_core.network.semantics.grouping import Groups, sinusoid
 
@@ -42,7 +42,7 @@ class FullSizeScratch(nn.Module):
     ) -> tuple[Float[Tensor, "n _ _ _"], ...]:
         """path_4, path_3, path_2 (n, f, s*h, s*w) for s = 1, 2, 4, and the mask map (n, f, H, W)."""
         paths = self.dpt(levels)
-        finest = double(paths.path_1, align_corners=True) + F.relu(self.shortcut(centred(images)))
+        finest = double(paths.path_1, align_corners=True) + F.relu(self.shortcut(centre_images(images)))
         return paths.path_4, paths.path_3, paths.path_2, finest
 
 
@@ -79,8 +79,8 @@ class ResidualGrouping(nn.Module):
         dim, depth = preset.grouping_dim, preset.grouping_layers
         if dim != preset.dpt_feature:
             raise ValueError(f"grouping_dim: expected the dpt_feature, {preset.dpt_feature}, received {dim}")
-        self.patterns = nn.Parameter(drawn(preset.num_queries, dim))
-        self.positions = nn.Parameter(drawn(preset.num_queries, dim))
+        self.patterns = nn.Parameter(draw_normal(preset.num_queries, dim))
+        self.positions = nn.Parameter(draw_normal(preset.num_queries, dim))
         self.layers = nn.ModuleList(QueryBlock(dim, preset.grouping_heads, bias=False) for _ in range(depth))
         self.scores = nn.ModuleList(MLP(dim, dim, 1) for _ in range(depth))
         self.mask_mlp = MLP(dim, dim, preset.dpt_feature)
@@ -109,7 +109,7 @@ class ResidualGrouping(nn.Module):
         return tuple(answers)
 
 
-def filtered(groups: Groups, rule: MaskFilter) -> Shaped[Tensor, " K"]:
+def filter_queries(groups: Groups, rule: MaskFilter) -> Shaped[Tensor, " K"]:
     """Indices (K,) of the queries of one scene (B = 1) whose masks are groups, best first.
 
     A mask is where the logit is above 0, over all views. It needs a predicted IoU, a stability

@@ -19,7 +19,7 @@ from jaxtyping import Float
 from torch import Tensor
 from torch.nn import functional as F
 
-from langflash_core.base.many import groups_of, held, in_groups, together
+from langflash_core.base.many import groups_of, in_groups, in_half_precision, together
 from langflash_core.network.presets import Splitting
 from langflash_core.network.prior import resize
 from langflash_core.network.semantics.settings import SPLITTING
@@ -52,7 +52,7 @@ def split_groups(
     """
     if weights.shape[1] == 0:
         return weights.new_zeros(len(weights), 0, *size)
-    joint = joint_maps(weights, embeddings, None if features is None else condensed(features), rule)
+    joint = joint_maps(weights, embeddings, None if features is None else condense_features(features), rule)
     return split_maps([lambda: joint], len(weights), rule, size)
 
 
@@ -87,12 +87,12 @@ def split_maps(
     def weights(group: Callable[[], Tensor]) -> Tensor:
         closeness = torch.einsum("vshw,js->vjhw", group(), rule.sharpness * centres)
         own = resize(closeness.contiguous(), size).softmax(1)  # three times as fast as in einsum's own order
-        return held(own, num_views)
+        return in_half_precision(own, num_views)
 
     return together(map(weights, groups), num_views)
 
 
-def condensed(features: Float[Tensor, "V C h w"]) -> Float[Tensor, "V D h w"]:
+def condense_features(features: Float[Tensor, "V C h w"]) -> Float[Tensor, "V D h w"]:
     """Maps (V, C, h, w) in the few directions that a scene needs, (V, `SPLITTING.directions`, h, w) float32:
     clustering then takes a fifth of the time, and cosines stay.
 
@@ -103,11 +103,11 @@ def condensed(features: Float[Tensor, "V C h w"]) -> Float[Tensor, "V D h w"]:
     drawn = torch.randn(features.shape[1], SPLITTING.directions, generator=torch.Generator().manual_seed(0))
     basis = drawn.to(features.device)
     for _ in range(2):
-        basis = torch.linalg.qr(_powered(features, basis)).Q
+        basis = torch.linalg.qr(_power_step(features, basis)).Q
     return in_groups(lambda some: torch.einsum("vchw,cd->vdhw", some.float(), basis), features)
 
 
-def _powered(features: Tensor, basis: Tensor) -> Tensor:
+def _power_step(features: Tensor, basis: Tensor) -> Tensor:
     """X^T X B of all pixels' features, (C, D); some views at a time."""
     found = None
     for some in groups_of(len(features)):

@@ -10,7 +10,7 @@ from langflash_core.writing.inventory.dxf import plan_dxf
 from langflash_core.writing.inventory.page import page_of
 from langflash_core.writing.inventory.tables import table_csv, table_json
 from langflash_core.writing.job import Job
-from langflash_core.writing.subject import counted
+from langflash_core.writing.subject import plural
 
 
 def write_inventory(job: Job) -> str:
@@ -31,7 +31,7 @@ def write_inventory(job: Job) -> str:
         content = table_csv(found) if kind == ".csv" else table_json(found, floor_plan(found))
     make_folder(job.request.output.parent)
     write_atomically(job.request.output, content.encode())
-    return f"{counted(len(found.things), 'thing')} of {counted(len(found.counts), 'kind')}"
+    return f"{plural(len(found.things), 'thing')} of {plural(len(found.counts), 'kind')}"
 
 
 def write_plan(job: Job) -> str:
@@ -46,4 +46,4 @@ def write_plan(job: Job) -> str:
     drawn = plan_svg(plan, title) if kind_of(job.request.output) == ".svg" else plan_dxf(plan)
     make_folder(job.request.output.parent)
     write_atomically(job.request.output, drawn.encode())
-    return f"{counted(len(plan.walls), 'wall')}, {counted(len(plan.things), 'thing')}"
+    return f"{plural(len(plan.walls), 'wall')}, {plural(len(plan.things), 'thing')}"

@@ -77,12 +77,12 @@ def plan_svg(plan: Plan, title: str, *, headed: bool = True) -> str:
         *(_thing(paper, thing, doubt_of(thing, plan)) for thing in sorted(plan.things, key=_area)),
         *(_wall(paper, wall) for wall in plan.walls),
         *(_opening(paper, opening, plan) for opening in plan.openings),
-        *(_badge(number + 1, place) for number, place in enumerate(_spread(paper, plan.things))),
+        *(_badge(number + 1, place) for number, place in enumerate(_place_badges(paper, plan.things))),
         *(_eye(paper, eye, number) for number, eye in enumerate(plan.eyes)),
         *_sizes(paper, plan),
         _list(plan, 2 * PAPER.edge + wide * per, listed),
         _bar(paper, plan, PAPER.top + 2 * PAPER.edge + high * per + 4),
-        _stood(plan, PAPER.top + 2 * PAPER.edge + high * per + 10),
+        _legend_note(plan, PAPER.top + 2 * PAPER.edge + high * per + 10),
         _arrow(2 * PAPER.edge + wide * per - 6, PAPER.top + 4),
         "</svg>",
     ]
@@ -109,7 +109,7 @@ def _thing(paper: _Paper, thing: Thing, doubt: str) -> str:
     return f'<polygon class="{kind}" points="{points}" stroke-linejoin="round">{title}</polygon>'
 
 
-def _spread(paper: _Paper, things: Sequence[Thing]) -> list[tuple[float, float]]:
+def _place_badges(paper: _Paper, things: Sequence[Thing]) -> list[tuple[float, float]]:
     """Where badges go: at the middles of their things, or as near as others leave room."""
     chosen: list[tuple[float, float]] = []
     for thing in things:
@@ -230,7 +230,7 @@ def _bar(paper: _Paper, plan: Plan, y: float) -> str:
     return "".join(halves) + f'<text class="note" x="{x + full + 1.5:.2f}" y="{y + 1.2:.2f}">1 m</text>'
 
 
-def _stood(plan: Plan, y: float) -> str:
+def _legend_note(plan: Plan, y: float) -> str:
     """What the dots are, and how what is doubted is drawn."""
     said = ["where the photos were taken"] * bool(plan.eyes)
     said += ["dashed: perhaps no wall"] * any(wall.doubt for wall in plan.walls)

@@ -43,7 +43,7 @@ def plan_dxf(plan: Plan) -> str:
         pairs += _text(middle, high, thing.title)
         pairs += _text((middle[0], middle[1] - 1.4 * high), high * 0.8, size(thing, plan.unit))
     pairs += [(0, "ENDSEC"), (0, "EOF")]
-    return "".join(f"{code}\n{_told(value)}\n" for code, value in pairs)
+    return "".join(f"{code}\n{_ascii_line(value)}\n" for code, value in pairs)
 
 
 def _line(layer: str, start: Place, end: Place) -> list[tuple[int, object]]:
@@ -72,7 +72,7 @@ def _text(place: Place, high: float, text: str) -> list[tuple[int, object]]:
     return [(0, "TEXT"), (8, "NAMES"), (10, place[0]), (20, place[1]), (30, 0.0), (40, high), (1, text)]
 
 
-def _told(value: object) -> str:
+def _ascii_line(value: object) -> str:
     """A value in one line of ASCII; other signs as \\U+XXXX, which CAD programs read."""
     if isinstance(value, float):
         return f"{value:.6f}"

@@ -57,7 +57,7 @@ def page_of(found: Inventory, plan: Plan, cutouts: Mapping[str, str], title: str
     numbers = {thing.id: number + 1 for number, thing in enumerate(plan.things)}
     rows = "".join(
         _row(thing, numbers.get(thing.id), cutouts.get(thing.id), found, doubt_of(thing, plan))
-        for thing in _ordered(found, plan)
+        for thing in _order_things(found, plan)
     )
     return (
         _HEAD.format(title=escape(title))
@@ -72,7 +72,7 @@ def page_of(found: Inventory, plan: Plan, cutouts: Mapping[str, str], title: str
     )
 
 
-def _ordered(found: Inventory, plan: Plan) -> list[Thing]:
+def _order_things(found: Inventory, plan: Plan) -> list[Thing]:
     """As the plan numbers them, then what is in walls."""
     return [*plan.things, *(thing for thing in found.things if thing not in plan.things)]
 

@@ -18,7 +18,7 @@ from langflash_core.export.png import to_8bit, write_grey, write_labels, write_m
 from langflash_core.export.sheet import contact_sheet, thumbnail
 from langflash_core.types import SegmentedView
 from langflash_core.writing.segmented import manifest
-from langflash_core.writing.subject import Subject, boxes, counted, cut_out, surfaces, views_of
+from langflash_core.writing.subject import Subject, boxes, cut_out, plural, surfaces, views_of
 
 _GREY = 0.25  # behind phrases on the sheet
 _WIDE = 8  # tiles of a view that fit into a row of their own
@@ -52,9 +52,9 @@ def write_folder(subject: Subject, request: ExportRequest, progress: Progress) -
         text = json.dumps(document, indent=2, ensure_ascii=False, allow_nan=False)
         (staging / "manifest.json").write_text(text, encoding="utf-8")
     said = [
-        f"{len(subject.found)} of {len(subject.names)} phrases, {counted(len(subject.things), 'instance')}"
+        f"{len(subject.found)} of {len(subject.names)} phrases, {plural(len(subject.things), 'instance')}"
     ]
-    said[0] += f" in {counted(len(places), 'view')}"
+    said[0] += f" in {plural(len(places), 'view')}"
     return "; ".join([*said, *(f"without {name}: {why}" for name, why in missing.items())])
 
 
@@ -119,7 +119,7 @@ def _tiles(subject: Subject, view: SegmentedView, where: str) -> list[tuple[str,
     tiles = [
         (where, to_8bit(view.frame.rgb)),
         ("nearness", depth_picture(view.frame)[0]),
-        (counted(len(subject.things), "instance"), colours[view.things.cpu().numpy()]),
+        (plural(len(subject.things), "instance"), colours[view.things.cpu().numpy()]),
     ]
     for phrase in subject.found:
         matte = view.mattes[phrase][..., None].cpu()

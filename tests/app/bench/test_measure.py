@@ -89,7 +89,9 @@ def test_the_default_must_come_first(gl, case):
 
 
 def test_a_picture_of_one_pixel(gl, case):
-    tiny = dataclasses.replace(case, path=Path(tuple(c.resized(1, 1) for c in case.path.cameras), "by hand"))
+    tiny = dataclasses.replace(
+        case, path=Path(tuple(c.with_size(1, 1) for c in case.path.cameras), "by hand")
+    )
     for mode, times, errors in measure(gl, tiny, modes_for(case.scene, ["resolution"]), silent).rows:
         assert len(times.frames) == 2 and 0 <= errors.relevance_max <= 1, mode.name
 

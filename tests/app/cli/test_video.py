@@ -121,7 +121,7 @@ def test_an_orbit_around_what_was_found(run, scene_file):
 @pytest.mark.parametrize("backend", [TorchRenderer, GlRenderer])
 def test_a_heat_map_film_glows_where_the_phrase_is(backend):
     scene, renderer = stripes(), backend()
-    heat = video.asked(scene, "armchair", None)
+    heat = video.compile_phrase(scene, "armchair", None)
     picture = video.picture(scene, scene.camera(0), renderer, heat).astype(int)
     plain = video.picture(scene, scene.camera(0), renderer, None).astype(int)
     assert np.abs(picture - plain).max() > 30

@@ -7,7 +7,7 @@ import pytest
 import torch
 
 from app.gl import SplatRenderer
-from langflash_core.scene.changed import changed
+from langflash_core.scene.changed import apply_changes
 from langflash_core.scene.changes import Change, Moved, Recoloured, turn_about
 from langflash_core.scene.mask import Mask
 from langflash_core.scene.thin import thin_with_rows
@@ -31,12 +31,12 @@ def some_changes() -> tuple[Change, ...]:
     turn = turn_about((0.3, 1.0, 0.2), 50.0)
     return (
         Moved.about(rows[0], (0.0, 0.0, 2.0), turn, 1.2, (0.1, 0.0, -0.1)),
-        Recoloured.tinted(rows[1], (0.9, 0.2, 0.1), 0.7, 0.5),
+        Recoloured.tint(rows[1], (0.9, 0.2, 0.1), 0.7, 0.5),
     )
 
 
 def moved(scene: Scene) -> Scene:
-    return replace(scene, gaussians=changed(scene.gaussians, some_changes()))
+    return replace(scene, gaussians=apply_changes(scene.gaussians, some_changes()))
 
 
 def test_a_changed_scene_is_drawn_as_if_it_had_come_so(renderer: SplatRenderer, scene: Scene) -> None:
@@ -61,7 +61,9 @@ def test_changes_reach_thinned_levels_before_and_after_they_are_made(
 ) -> None:
     seen, share = camera(96, 80, 80.0), 0.5
     thinned, rows = thin_with_rows(scene, share)
-    wanted = replace(thinned, gaussians=changed(thinned.gaussians, some_changes(), torch.from_numpy(rows)))
+    wanted = replace(
+        thinned, gaussians=apply_changes(thinned.gaussians, some_changes(), torch.from_numpy(rows))
+    )
     expected = render(wanted, seen, weight_maps=False).rgb
     for made_first in (True, False):
         renderer.set_scene(replace(scene))  # another object: a new upload

@@ -8,7 +8,7 @@ import pytest
 import torch
 
 from app.gl import SplatRenderer, moving_renderer
-from langflash_core.scene.changed import changed
+from langflash_core.scene.changed import apply_changes
 from langflash_core.scene.changes import Change, Moved, Recoloured, turn_about
 from langflash_core.scene.mask import Mask
 from langflash_core.scene.thin import coarse_share, thin_with_rows
@@ -109,14 +109,14 @@ def test_a_gesture_and_its_undoing_reach_them(pair, scene):
     turn = turn_about((0.3, 1.0, 0.2), 50.0)
     changes: tuple[Change, ...] = (
         Moved.about(moved, (0.0, 0.0, 2.0), turn, 1.2, (0.1, 0.0, -0.1)),
-        Recoloured.tinted(tinted, (0.9, 0.2, 0.1), 0.7, 0.5),
+        Recoloured.tint(tinted, (0.9, 0.2, 0.1), 0.7, 0.5),
     )
     pair[0].draw(aside(), share=share)
     before = pair[0].frame().rgb
     pair[0].change(changes)
     pair[0].draw(aside(), share=share)
     alone = scene.rows(rows)
-    pair[1].set_scene(replace(alone, gaussians=changed(alone.gaussians, changes, rows)))
+    pair[1].set_scene(replace(alone, gaussians=apply_changes(alone.gaussians, changes, rows)))
     pair[1].draw(aside())
     # Turned coefficients are made of float64 either way; places are the very same numbers.
     assert torch.equal(pair[0].frame().rgb, pair[1].frame().rgb)
@@ -138,7 +138,7 @@ def test_fewer_of_them_and_some_detail_follow_marks_and_changes(pair, scene, sha
     pair[0].mark(shown, np.zeros(COUNT, np.uint8))
     pair[0].change(changes)
     pair[0].draw(aside(), share=share)
-    moved = changed(thinned.gaussians, changes, torch.from_numpy(rows))
+    moved = apply_changes(thinned.gaussians, changes, torch.from_numpy(rows))
     pair[1].set_scene(replace(thinned, gaussians=moved))
     pair[1].mark(shown[rows], np.zeros(len(rows), np.uint8))
     pair[1].draw(aside())

@@ -20,7 +20,7 @@ from langflash_core.errors import Cancelled
 from langflash_core.geometry.cameras import invert_rigid
 from langflash_core.geometry.harmonics import colour_to_sh
 from langflash_core.geometry.nearness import Nearness
-from langflash_core.scene.changed import changed
+from langflash_core.scene.changed import apply_changes
 from langflash_core.scene.changes import Moved, Recoloured
 from langflash_core.scene.mask import Mask
 from langflash_core.scene.thin import thin_with_rows
@@ -231,9 +231,11 @@ def test_changes_reach_every_layer(gl):
     chosen = torch.arange(len(scene.gaussians)) % 3 == 0
     changes = (
         Moved(Mask.of(chosen.numpy()), offset=(0.3, 0.1, 0.2)),
-        Recoloured.tinted(Mask.of(~chosen.numpy()), (1.0, 0.0, 0.0), 0.5, 0.5),
+        Recoloured.tint(Mask.of(~chosen.numpy()), (1.0, 0.0, 0.0), 0.5, 0.5),
     )
-    expected = compose.render(doubled(replace(scene, gaussians=changed(scene.gaussians, changes))), seen)
+    expected = compose.render(
+        doubled(replace(scene, gaussians=apply_changes(scene.gaussians, changes))), seen
+    )
     renderer = SplatRenderer(gl, "float32")
     renderer.set_scene(scene)
     renderer.draw(replace(seen, viewmat=scene.viewmats[0].double()))
@@ -289,7 +291,7 @@ def moving_twin(scene: Scene, seen: Camera, weight_maps: bool = False) -> Frame:
     if len(layers) == 1:
         return first
     second = reference.render(layers[1], half(seen), weight_maps=weight_maps)
-    return compose.blended([first, enlarged(second, (seen.width, seen.height))], chosen.weights)
+    return compose.blend_layers([first, enlarged(second, (seen.width, seen.height))], chosen.weights)
 
 
 def walls(num_views: int) -> Scene:
@@ -362,7 +364,7 @@ def test_layers_are_made_one_a_call(renderer):
 @pytest.mark.parametrize("size", [(96, 80), (95, 79)], ids=["even", "odd"])
 @pytest.mark.parametrize("how", ["fast", "a share", "moving"])
 def test_a_moving_picture_is_blended_of_two(quick, precision, num_views, size, how):
-    scene, seen = layered(num_views), between(num_views).resized(*size)
+    scene, seen = layered(num_views), between(num_views).with_size(*size)
     share = 0.999 if how == "a share" else 1.0
     quick.set_scene(scene)
     quick.draw(seen, fast=how == "fast", share=share, moving=how == "moving", weight_maps=False)
@@ -436,7 +438,7 @@ def test_numbers_are_made_once_a_layer(quick, monkeypatch):
 @pytest.mark.parametrize("size", [(96, 80), (95, 79)], ids=["even", "odd"])
 def test_more_phrases_than_fit_are_asked_of_what_moves(gl, size):
     """Weight maps blended of two layers."""
-    scene, seen = layered(3), between(3).resized(*size)
+    scene, seen = layered(3), between(3).with_size(*size)
     compiled = question(scene, 40)
     renderer = SplatRenderer(gl, "float32", hardware=replace(hardware_of(gl), blends_all=False))
     renderer.set_scene(scene)
@@ -497,7 +499,7 @@ def test_a_still_picture_of_two_layers_is_blended_of_the_nearest():
     still = draw_still(scene, seen, most=2)
     chosen = Nearness.of(scene).chosen(seen, 2)
     frames = [reference.render(doubled(scene).layer(view), seen) for view in chosen.views]
-    expected = compose.blended(frames, chosen.weights)
+    expected = compose.blend_layers(frames, chosen.weights)
     assert psnr(still.frame.rgb, expected.rgb) >= 60 and still.maps is not None  # as above
     assert (still.maps.weights.double() - maps_of(expected)).abs().mean() < 2e-4
     assert psnr(compose.render(doubled(scene), seen).rgb, expected.rgb) < 40
@@ -574,7 +576,7 @@ def test_pictures_of_single_layers_of_one_size_are_kept(renderer):
     renderer.set_scene(scene)
     renderer.draw(seen)
     first, view = renderer.frame(weight_maps=True), renderer.canvas.view((96, 80))
-    renderer.draw(seen.resized(48, 40))
+    renderer.draw(seen.with_size(48, 40))
     assert not view._blend._layers
     renderer.draw(seen)
     again = renderer.frame(weight_maps=True)

@@ -237,7 +237,7 @@ def test_layers_leave_nothing(gl, use_another_program, blends_all):
     scene = layered(12, count=40)
     renderer.set_scene(scene)
     for view in range(12):
-        seen = scene.camera(view).resized(32 + 8 * (view % 2), 24)
+        seen = scene.camera(view).with_size(32 + 8 * (view % 2), 24)
         renderer.ask(question(scene, 1 + view % 3))
         renderer.draw(seen, fast=True, share=(1.0, 0.5)[view % 2])
         renderer.relevance()

@@ -8,8 +8,8 @@ import torch
 
 from app.gl import SplatRenderer, paints
 from langflash_core.export.png import glow_share
-from langflash_core.scene.gaps import filled
-from langflash_core.scene.trust import faded
+from langflash_core.scene.gaps import fill_gaps
+from langflash_core.scene.trust import fade_untrusted
 from langflash_core.types import LUMA
 from tests.app.gl.questions import question
 from tests.splat.scenes import camera, cloud, maps_of, parallel, scene_of, splats
@@ -189,7 +189,7 @@ def test_faded_is_the_frame_fading_over_the_background(asked, aside, flat):
     black = asked.frame()
     asked.draw(shot, background=(0.0, 0.5, 1.0))
     shown = pixels(asked.faded_texture())[..., :3]
-    fading = faded(black, shot, scene)
+    fading = fade_untrusted(black, shot, scene)
     expected = fading.rgb + (1 - fading.alphas[..., None]) * background
     # Eight bits: half a step, and the depth of a thin pixel is a quotient of two halves.
     np.testing.assert_allclose(shown, expected.clamp(0, 1).numpy(), atol=2.5 / 255)
@@ -223,9 +223,9 @@ def test_gaps_are_filled_as_the_twin_does(asked, fading):
     shown = pixels(asked.faded_texture() if fading else asked.rgb_texture)[..., :3]
     under = frame.rgb
     if fading:  # the background stands in for what is not known, and is around gaps as well
-        near = faded(frame, shot, scene)
+        near = fade_untrusted(frame, shot, scene)
         under = near.rgb + (frame.alphas - near.alphas)[..., None] * background
-    expected = filled(under, frame.alphas, background)
+    expected = fill_gaps(under, frame.alphas, background)
     # Eight bits: half a step; the coarser pictures have eleven bits, and linear filters eight.
     np.testing.assert_allclose(shown, expected.clamp(0, 1).numpy(), atol=2.5 / 255)
     assert np.abs(shown - empty).max() > 0.2  # there were gaps

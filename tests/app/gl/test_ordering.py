@@ -127,7 +127,7 @@ def test_what_a_camera_sees(many):
     assert not sees(seen, turned(seen, 180), depths, MARGIN)
     assert sees(seen, along(seen, 0.5), depths, 0.0)  # towards what is there
     assert not sees(seen, along(seen, -1), depths, MARGIN)
-    assert sees(seen, seen.resized(80, 60), depths, 1e-3)
+    assert sees(seen, seen.with_size(80, 60), depths, 1e-3)
     wider = dataclasses.replace(seen, K=seen.K * torch.tensor([0.5, 0.5, 1.0])[:, None])
     assert not sees(seen, wider, depths, MARGIN)
     flat = dataclasses.replace(seen, orthographic=True)

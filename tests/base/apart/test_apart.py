@@ -17,7 +17,7 @@ from langflash_core.base.apart import process, serving
 from langflash_core.errors import FilmError, ImageError, InputError, SceneFileError
 from langflash_core.export import read
 from langflash_core.images.decode import read_photo
-from langflash_core.images.film import opened
+from langflash_core.images.film import open_film
 from tests import films
 
 # A reader that does what its request says, in the place of one of ours.
@@ -151,7 +151,7 @@ def test_users_get_one_sentence_and_code_2(tmp_path, monkeypatch):
         (tmp_path / name).write_bytes(b"\0\0\0\x18ftypheic" + bytes(99))
 
     def film() -> None:
-        with opened(tmp_path / "a.mp4"):
+        with open_film(tmp_path / "a.mp4"):
             pass
 
     for does, kind in (
@@ -202,13 +202,13 @@ def test_a_film_that_is_a_list_of_other_files_is_none(tmp_path):
     films.write(tmp_path / "real.mp4", films.walk(4))
     for text in ("ffconcat version 1.0\nfile real.mp4\n", "#EXTM3U\n#EXTINF:1,\nreal.mp4\n#EXT-X-ENDLIST\n"):
         (tmp_path / "list.mp4").write_text(text)
-        with pytest.raises(FilmError, match="no film that can be decoded"), opened(tmp_path / "list.mp4"):
+        with pytest.raises(FilmError, match="no film that can be decoded"), open_film(tmp_path / "list.mp4"):
             pass
 
 
 def test_a_film_left_early_ends_its_process(tmp_path):
     path = films.write(tmp_path / "walk.mp4", films.walk(40))
-    with opened(path) as reader:
+    with open_film(path) as reader:
         pictures = reader.pictures(0.0, None, lambda: None)
         assert isinstance(pictures, Generator)
         next(pictures)

@@ -37,7 +37,7 @@ def test_three_things_are_pushed_over_the_floor_into_free_places_that_photos_see
 
 def test_of_true_scenes_what_moved_is_found_and_of_one_scene_nothing(pushed, monkeypatch):
     same = Fit(np.eye(3), 1.0, np.zeros(3), 40, 50)
-    monkeypatch.setattr(beside, "aligned", lambda first, second, render: same)
+    monkeypatch.setattr(beside, "align_scenes", lambda first, second, render: same)
     scenes = [true_scene(each) for each in (pushed.before, pushed.after)]
     world = found_world(scenes[0])
     found = [inventory(each.with_record(world=world, metric_scale=UNIT)) for each in scenes]

@@ -163,7 +163,7 @@ def test_a_crop_shows_a_window_of_the_picture():
     torch.testing.assert_close(crop, whole[8:24, 20:36], atol=1e-5, rtol=0)
     near = crop_camera(camera, (8, 20), 16, 8)
     assert (near.width, near.height) == (128, 128)
-    enlarged = camera.resized(56 * 8, 42 * 8)
+    enlarged = camera.with_size(56 * 8, 42 * 8)
     torch.testing.assert_close(
         render(scene, near, weight_maps=False).alphas,
         render(scene, enlarged, weight_maps=False).alphas[64:192, 160:288],

@@ -5,7 +5,7 @@ import math
 import numpy as np
 import torch
 
-from langflash_core.network.precision import mixed
+from langflash_core.network.precision import mixed_precision
 
 
 def depth_loss_twin(logs, targets, absolute):
@@ -127,7 +127,7 @@ def plain_training(network, stage, rooms, words, *, steps, pictures):
         sizes, chances = list(stage.views), torch.tensor(list(stage.views.values()))
         views = sizes[int(torch.multinomial(chances, 1, generator=words.generator))]
         batch = rooms.draw(max(1, pictures // views), views, words.generator)
-        with mixed("cpu"):
+        with mixed_precision("cpu"):
             loss = stage.loss(network, batch, words).total
         optimiser.zero_grad()
         loss.backward()

@@ -12,7 +12,7 @@ from langflash_core import pipeline
 from langflash_core.base.picture_files import opened_picture
 from langflash_core.export.colours import heat
 from langflash_core.export.png import heat_over, to_8bit
-from langflash_core.export.sheet import captioned
+from langflash_core.export.sheet import add_caption
 from langflash_core.geometry.cameras import invert_rigid
 from langflash_core.geometry.quaternions import matrices_to_quats, quats_to_matrices
 from langflash_core.reconstruction.networks import Networks
@@ -65,12 +65,12 @@ def _views(scene: Scene, pair: Sequence[Path], renderer: Renderer) -> list[np.nd
     nearness = (near / shown.depths.clamp_min(near)) * (shown.alphas > 0.5)
     photos = [_photo(path, (own.width, own.height)) for path in pair]
     return [
-        captioned(photos[0], pair[0].name),
-        captioned(photos[1], pair[1].name),
-        captioned(to_8bit(shown.rgb), "view 0"),
-        captioned(to_8bit(renderer(scene, between, weight_maps=False).rgb), "between"),
-        captioned(to_8bit(renderer(scene, beside, weight_maps=False).rgb), "beside view 0"),
-        captioned(to_8bit(heat(nearness)), "nearness"),
+        add_caption(photos[0], pair[0].name),
+        add_caption(photos[1], pair[1].name),
+        add_caption(to_8bit(shown.rgb), "view 0"),
+        add_caption(to_8bit(renderer(scene, between, weight_maps=False).rgb), "between"),
+        add_caption(to_8bit(renderer(scene, beside, weight_maps=False).rgb), "beside view 0"),
+        add_caption(to_8bit(heat(nearness)), "nearness"),
     ]
 
 
@@ -81,13 +81,13 @@ def _answers(scene: Scene, renderer: Renderer, prompts: Sequence[str]) -> list[n
     for answer, relevance in zip(result.answers, result.relevance, strict=True):
         view = heat_over(relevance, result.frame.rgb, answer.threshold, result.mode)
         verdict = f"{answer.score:.2f}" if answer.found else f"not found ({answer.score:.2f})"
-        cells.append(captioned(to_8bit(view), f"{answer.prompt}: {verdict}"))
+        cells.append(add_caption(to_8bit(view), f"{answer.prompt}: {verdict}"))
     return cells
 
 
 def _camera(scene: Scene, viewmat: Tensor) -> Camera:
     width, height = scene.view_size
-    return Camera(viewmat, scene.Ks[0], width, height).resized(round(_HEIGHT * width / height), _HEIGHT)
+    return Camera(viewmat, scene.Ks[0], width, height).with_size(round(_HEIGHT * width / height), _HEIGHT)
 
 
 def _between(first: Tensor, second: Tensor, share: float) -> Tensor:

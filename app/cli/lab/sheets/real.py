@@ -5,7 +5,7 @@ from PIL import Image
 from torch import Tensor
 
 from langflash_core.export.png import to_8bit
-from langflash_core.export.sheet import captioned
+from langflash_core.export.sheet import add_caption
 from langflash_core.lab.evaluation.real import ALONE, BETWEEN, OWN, PHOTO, SCENE
 
 MOST = 6
@@ -43,4 +43,4 @@ class Sheet:
             ALONE: "this photo alone" if kind == OWN else "two photos alone",
         }
         found = self._pictures[key]
-        return np.concatenate([captioned(found[title], told[title]) for title in told if title in found])
+        return np.concatenate([add_caption(found[title], told[title]) for title in told if title in found])

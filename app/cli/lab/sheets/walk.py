@@ -15,7 +15,7 @@ from langflash_core.base.files import make_folder, write_atomically
 from langflash_core.base.picture_files import opened_picture
 from langflash_core.errors import InputError
 from langflash_core.export.png import to_8bit
-from langflash_core.export.sheet import captioned
+from langflash_core.export.sheet import add_caption
 from langflash_core.lab.evaluation.walk import OWN, TRUTH, Shown
 
 MOST = 12
@@ -79,4 +79,4 @@ def _band(stem: str, folders: Sequence[tuple[str, Path]], titles: Sequence[str])
 def _cell(path: Path, title: str) -> np.ndarray:
     with opened_picture(path) as stored:
         size = (round(stored.width * _HEIGHT / stored.height), _HEIGHT)
-        return captioned(np.asarray(stored.convert("RGB").resize(size, Image.Resampling.LANCZOS)), title)
+        return add_caption(np.asarray(stored.convert("RGB").resize(size, Image.Resampling.LANCZOS)), title)

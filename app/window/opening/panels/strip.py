@@ -43,7 +43,11 @@ def draw(state: State, look: Look) -> list[do.Command]:
 def told(film: Film) -> str:
     """What became of the film's frames."""
     left = [f"{count} {REASONS[key]}" for key, count in film.left_out.items() if count]
-    return f"Of {film.strip.looked} frames {', '.join(left)}." if left else f"{film.strip.looked} frames."
+    return (
+        f"Of {film.strip.num_looked_at} frames {', '.join(left)}."
+        if left
+        else f"{film.strip.num_looked_at} frames."
+    )
 
 
 def _number(state: State, film: Film, look: Look) -> list[do.Command]:

@@ -7,7 +7,7 @@ from imgui_bundle import ImVec2, imgui
 from imgui_bundle import icons_fontawesome_6 as fa
 
 from langflash_core.base.records import FoundLens
-from langflash_core.base.running import left
+from langflash_core.base.running import time_left
 from langflash_core.geometry.poses import FOV_RANGE
 from langflash_core.images.still_names import shown_name
 
@@ -356,7 +356,7 @@ def _doing(job: Job) -> str:
 
 def _seconds(job: Job, now: float) -> str:
     """What is left of the job, where that can be told; else seconds of the stage so far."""
-    return left(job.age(now), job.fraction) or f"{now - job.started:.1f} s"
+    return time_left(job.age(now), job.fraction) or f"{now - job.started:.1f} s"
 
 
 def _told(job: Job) -> str:

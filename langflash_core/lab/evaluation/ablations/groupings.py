@@ -15,7 +15,7 @@ from torch import Tensor
 from torch.nn import functional as F
 
 from langflash_core.network.prior import resize
-from langflash_core.network.semantics.splitting import condensed
+from langflash_core.network.semantics.splitting import condense_features
 
 EVERY = 4
 """Of the points, a side, that clusters are found on; every point then joins its nearest centre."""
@@ -80,7 +80,7 @@ def regrouped(
     Args:
         weights: sum to 1 over K. features: L(x), unit norm.
     """
-    known = resize(condensed(features[0]), (weights.shape[-2], weights.shape[-1]))  # (V, S, H, W)
+    known = resize(condense_features(features[0]), (weights.shape[-2], weights.shape[-1]))  # (V, S, H, W)
     pixels = known.permute(0, 2, 3, 1).flatten(0, 2)
     table = weights.permute(0, 2, 3, 1).flatten(0, 2)  # (X, K)
     table = _merged(table, pixels, count) if table.shape[1] >= count else _cut(table, pixels, count)

@@ -34,7 +34,7 @@ from langflash_core.lab.training.shards import RoomRecord
 from langflash_core.language.channels import Decoder, principal
 from langflash_core.network.model import Seen, pooled_weights
 from langflash_core.network.semantics.aggregation import averaged_atoms
-from langflash_core.scene.weights import renormalised
+from langflash_core.scene.weights import renormalise
 from langflash_core.types import Prediction
 
 KEPT = 8
@@ -139,7 +139,7 @@ def _fits(setting: Setting, data: Path, kept: Path | None, source: str, progress
         examples = gathered(_train_features(setting, data, progress))
         if kept is not None:
             keep_examples(kept, source, examples)
-    decoders = {count: Decoder.fitted(examples.features, count) for count in CHANNELS}
+    decoders = {count: Decoder.fit(examples.features, count) for count in CHANNELS}
     return Fits(decoders, principal(examples.left, RESIDUAL))
 
 
@@ -241,7 +241,7 @@ def stored(weights: Tensor) -> Tensor:
     """w (V, K, H, W) as scenes hold it: the largest `KEPT` of a Gaussian, sum 1, (N, K)."""
     rows = weights.permute(0, 2, 3, 1).flatten(0, 2)
     values, places = rows.topk(min(KEPT, rows.shape[1]), dim=-1)
-    return torch.zeros_like(rows).scatter(1, places, renormalised(values))
+    return torch.zeros_like(rows).scatter(1, places, renormalise(values))
 
 
 def _vectors(room: _Room, weights: Tensor) -> tuple[dict[str, Tensor], float]:

@@ -13,7 +13,7 @@ from langflash_core.lab.training.measures import (
 )
 from langflash_core.lab.training.shards import RoomRecord
 from langflash_core.language.answers import presence_scores
-from langflash_core.language.relevance import relevancy, rivalled
+from langflash_core.language.relevance import relevancy, rival_terms
 from langflash_core.language.settings import RELEVANCE
 from langflash_core.language.spaces import encode_cached
 from langflash_core.language.vocabulary import OWN
@@ -44,7 +44,7 @@ def ask_phrases(
     vectors = setting.space.encode(words)
     mixed = torch.einsum("khw,kc->hwc", prediction.weights[0], prediction.dictionary)
     features, norms = F.normalize(mixed, dim=-1), mixed.norm(dim=-1).clamp_min(RELEVANCE.empty_norm)
-    beaten = rivalled(prediction.dictionary, setting.space, words, vectors)
+    beaten = rival_terms(prediction.dictionary, setting.space, words, vectors)
     added = torch.einsum("khw,kp->phw", prediction.weights[0], beaten) / norms
     positives = (torch.einsum("hwc,pc->phw", features, vectors) + added).clamp(-1, 1)
     negatives = torch.einsum("hwc,mc->mhw", features, setting.negatives)

@@ -14,7 +14,7 @@ from torch import Tensor, nn
 from torch.nn import functional as F
 
 from langflash_core.network.checkpoints.importing import read_checkpoint
-from langflash_core.network.encoders.mobile_sam import SIDE, MobileSamEncoder, filled, own_names
+from langflash_core.network.encoders.mobile_sam import SIDE, MobileSamEncoder, load_frozen, own_names
 from langflash_core.network.semantics.mobile_sam.decoder import MaskDecoder
 from langflash_core.network.semantics.mobile_sam.prompts import (
     INSIDE,
@@ -59,7 +59,7 @@ class MobileSam(nn.Module):
         rows, columns = self.image_encoder.fitting(*image.shape[:2])
         small = Image.fromarray(image).resize((columns, rows), Image.Resampling.BILINEAR)
         pixels = torch.from_numpy(np.array(small)).to(self._device).movedim(-1, 0)[None] / 255
-        features = self.image_encoder(self.image_encoder.squared(pixels))
+        features = self.image_encoder(self.image_encoder.pad_to_square(pixels))
         return Looked(features, image.shape[:2], self.side / max(image.shape[:2]))
 
     def by_points(
@@ -135,4 +135,4 @@ def load_mobile_sam(path: Path, side: int = SIDE, device: str = "cpu") -> Mobile
     Raises:
         WeightsError: the file cannot be read, or is not of MobileSAM.
     """
-    return filled(MobileSam(side), own_names(read_checkpoint(path)), path, "MobileSAM").to(device)
+    return load_frozen(MobileSam(side), own_names(read_checkpoint(path)), path, "MobileSAM").to(device)

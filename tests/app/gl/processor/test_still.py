@@ -239,6 +239,6 @@ def test_what_is_on_show_stays_while_another_size_is_drawn(gl, scene) -> None:
     renderer.draw(SEEN, weight_maps=False)
     shown = renderer.rgb_texture
     before = pixels(shown)
-    renderer.draw(SEEN.resized(48, 40), weight_maps=False)
+    renderer.draw(SEEN.with_size(48, 40), weight_maps=False)
     assert np.array_equal(pixels(shown), before)
     renderer.release()

@@ -18,7 +18,7 @@ from langflash_core.base import pictures
 from langflash_core.base.pictures import PICTURES, margin_span
 from langflash_core.errors import PromptError
 from langflash_core.language.algebra import terms
-from langflash_core.language.grammar import read
+from langflash_core.language.grammar import read_phrase
 from tests.app.window.scenes import after, shown_scene
 
 
@@ -193,7 +193,10 @@ def test_a_reading_is_shown_until_the_words_change() -> None:
 
 def test_a_reading_that_is_taken_away_leaves_the_phrase_within_quotes() -> None:
     state = after(asked(' the "white" chair '), ask.AskWhole(0))
-    assert state.asking.prompts[0].text == '"the white chair"' and read(state.asking.prompts[0].text).whole
+    assert (
+        state.asking.prompts[0].text == '"the white chair"'
+        and read_phrase(state.asking.prompts[0].text).whole
+    )
     empty = after(State(), ask.AskWhole(0), ask.AskWhole(99))
     assert empty.asking.prompts == State().asking.prompts
 

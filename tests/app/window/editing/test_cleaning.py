@@ -1,4 +1,4 @@
-"""Clean-up by rules in the window, against the library's `cleaned`; its files, its box, its undo."""
+"""Clean-up by rules in the window, against the library's `apply_recipe`; its files, its box, its undo."""
 
 from dataclasses import replace
 from pathlib import Path
@@ -17,7 +17,7 @@ from app.window.scene.work import describe_scene
 from app.window.state import State
 from langflash_core.geometry import poses
 from langflash_core.language.spaces import language_space
-from langflash_core.mending.cleaning import cleaned
+from langflash_core.mending.cleaning import apply_recipe
 from langflash_core.mending.recipes import Recipe, load_recipe, parsed_rule
 from langflash_core.scene.mask import Mask
 from tests.app.window.scenes import PHRASES, after, room
@@ -67,10 +67,10 @@ def test_the_preview_is_what_the_command_takes(shown: State, recipe: Recipe, sel
         shown = after(shown, edit.Found(within, "replace", "here"), edit.FindFloaters())
     fields = ("strength", "kinds", "rules", "within", "invert", "crop")
     state = worked(after(shown, clean.ChangeRecipe({name: getattr(recipe, name) for name in fields})))
-    wanted = cleaned(info.scene, recipe).rows
+    wanted = apply_recipe(info.scene, recipe).rows
     if within is not None:  # a box holds everywhere
-        boxed = cleaned(info.scene, Recipe(crop=recipe.crop)).rows
-        wanted = cleaned(info.scene, replace(recipe, crop=None)).rows & within.rows() | boxed
+        boxed = apply_recipe(info.scene, Recipe(crop=recipe.crop)).rows
+        wanted = apply_recipe(info.scene, replace(recipe, crop=None)).rows & within.rows() | boxed
     assert np.array_equal(going(state).rows(), wanted)
     assert selecting or 0 < wanted.sum() < COUNT
 
@@ -89,7 +89,7 @@ def test_the_strength_moves_on_what_the_rules_found(shown: State) -> None:
     state = worked(after(shown, clean.ChangeRecipe({"rules": RULES[:1]})))
     moved = after(state, edit.SetStrength(0.0))
     assert moved.scene.info is not None
-    wanted = cleaned(moved.scene.info.scene, Recipe(0.0, rules=RULES[:1])).rows
+    wanted = apply_recipe(moved.scene.info.scene, Recipe(0.0, rules=RULES[:1])).rows
     assert np.array_equal(going(moved).rows(), wanted)
 
 

@@ -29,7 +29,7 @@ from app.window.scene.work import describe_scene
 from app.window.state import State
 from langflash_core.errors import InputError
 from langflash_core.mending.hiding import preview
-from langflash_core.mending.looks import drawn
+from langflash_core.mending.looks import draw_scene
 from langflash_core.mending.settings import RECIPE_DEFAULTS
 from langflash_core.scene.changes import Moved
 from langflash_core.scene.file import load, save
@@ -184,7 +184,7 @@ def test_the_margin_is_seen_before_and_hidden_as_it_was_seen(desk: Desk) -> None
         found = asked.mask(marks)
         assert found is not None and not marks.selected - found
         counts.append(len(found))
-    slow = preview(info.scene, torch.from_numpy(marks.selected.rows()), drawn, 0.1)
+    slow = preview(info.scene, torch.from_numpy(marks.selected.rows()), draw_scene, 0.1)
     assert counts[2] == int(slow.sum()) and BLOCK <= counts[0] < counts[1] < counts[2] < counts[3] < COUNT
     desk.perform(mending.SetMargin(0.1), mending.HideForGood("pixels", 0.1))
     desk.work()

@@ -162,7 +162,7 @@ def test_an_unsaved_scene_is_read_from_its_copy() -> None:
 
 def test_unsaved_edits_and_a_selection_are_read_from_their_copies() -> None:
     plain = scene()
-    marks = Marks.untouched(8, 3)
+    marks = Marks.without_edits(8, 3)
     selected = replace(marks, selected=Mask.full(8), atoms=(Atom(0, "sofa"), *marks.atoms[1:]))
     editing = replace(plain.editing, history=History(selected), saved=marks)
     state = form(replace(plain, editing=editing), what=outputs.PLY, path="/x")

@@ -233,7 +233,7 @@ def test_what_is_told_of_frames_adds_up_however_they_are_chosen(desk: Desk) -> N
     def kept() -> int:
         return len(desk.film.chosen) + sum(desk.film.left_out.values())
 
-    assert kept() == desk.film.strip.looked == 40
+    assert kept() == desk.film.strip.num_looked_at == 40
     proposed = desk.film.left_out
     left = next(index for index in range(len(desk.film.strip.stills)) if index not in desk.film.chosen)
     desk.perform(opening.SwitchFrame(left))
@@ -257,4 +257,4 @@ def test_a_blurred_frame_that_is_taken_in_was_blurred(desk: Desk) -> None:
     assert 3 not in film.chosen
     by_hand = replace(film, chosen=tuple(sorted({*film.chosen, 3})))
     assert by_hand.left_out["blurred"] == film.left_out["blurred"] - 1
-    assert sum(by_hand.left_out.values()) + len(by_hand.chosen) == strip.looked
+    assert sum(by_hand.left_out.values()) + len(by_hand.chosen) == strip.num_looked_at

@@ -20,7 +20,7 @@ MOVES = (Moved(ONE, offset=(0.5, 0.0, 0.1)), Moved(ALL, scale=1.5), Moved(ONE, o
 
 
 def marks_of(*moves: Moved) -> Marks:
-    return replace(Marks.untouched(COUNT, 3), changes=moves)
+    return replace(Marks.without_edits(COUNT, 3), changes=moves)
 
 
 def test_going_on_from_what_is_there_is_the_same_as_from_the_beginning() -> None:

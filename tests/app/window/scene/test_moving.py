@@ -309,7 +309,9 @@ def test_home_is_upright_and_so_is_the_way(state: State) -> None:
     assert state.editing.history is not None
     marks = replace(state.editing.history.marks, world=stands)
     level = state.with_editing(history=replace(state.editing.history, marks=marks))
-    lost = poses.look(poses.righted(poses.fly(state.scene.pose, 0.1, 0.1, 0.5), level.up), 2.5, 0.6, level.up)
+    lost = poses.look(
+        poses.make_upright(poses.fly(state.scene.pose, 0.1, 0.1, 0.5), level.up), 2.5, 0.6, level.up
+    )
     flying = after(level.with_scene(pose=lost, view=None), camera.Home())
     for share in (0.2, 0.4, 0.6, 0.8, 1.0):
         on_the_way = after(flying, Tick(flying.now + share * FLIGHT_SECONDS + 1e-6)).scene.pose
