@@ -9,6 +9,7 @@
 
 Make
     reconstruct   photos to a scene
+    add_photos    more photos into a finished scene
     frames        the sharpest frames of a film, as photos: lf.reconstruct(lf.frames("walk.mp4"))
     Networks      keeps the network for the next scene
 
@@ -48,6 +49,7 @@ if TYPE_CHECKING:
     from langflash_core.export import read as load
     from langflash_core.images.frames import frames as frames
     from langflash_core.inventory import inventory as inventory
+    from langflash_core.pipeline import add_photos as add_photos
     from langflash_core.pipeline import query as query
     from langflash_core.pipeline import reconstruct as reconstruct
     from langflash_core.pipeline import select as select
@@ -63,6 +65,7 @@ wait_asleep()
 
 _HOMES = {
     "reconstruct": ("pipeline", "reconstruct"),
+    "add_photos": ("pipeline", "add_photos"),
     "frames": ("images.frames", "frames"),
     "Networks": ("reconstruction.networks", "Networks"),
     "query": ("pipeline", "query"),
@@ -79,8 +82,8 @@ _HOMES = {
 _SELVES = ("inventory",)  # packages of that name, which can be called
 
 # What help() tells one by one below the page; classes have pages of their own.
-__all__ = ["frames", "inventory", "load", "query", "reconstruct", "render", "renderer", "save", "segment",
-           "select", "write"]  # fmt: skip
+__all__ = ["add_photos", "frames", "inventory", "load", "query", "reconstruct", "render", "renderer", "save",
+           "segment", "select", "write"]  # fmt: skip
 
 
 def __getattr__(name: str) -> object:
