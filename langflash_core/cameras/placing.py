@@ -1,15 +1,19 @@
-"""Where was the camera that sees these points at these pixels?
+"""Where was the camera that sees these points at these pixels, and the same in cameras that are known?
 
 Source: Lepetit et al. 2009 for the problem (PnP), SQPnP (Terzakis and Lourakis 2020) for its solution, as
-OpenCV has them.
+OpenCV has them; Triggs et al. 2000 for the adjustment.
 """
 
 from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
+from scipy.optimize import least_squares
+from scipy.sparse import lil_matrix
+from scipy.spatial.transform import Rotation
 
+from langflash_core.geometry.pinhole import from_pixels, to_pixels
 from langflash_core.rig.settings import ADDING
 
 
@@ -51,3 +55,62 @@ def place_camera(
     viewmat = np.eye(4)
     viewmat[:3, :3], viewmat[:3, 3] = cv2.Rodrigues(turn)[0], shift[:, 0] * unit
     return Placed(viewmat, agree) if np.isfinite(viewmat).all() else None
+
+
+@dataclass(frozen=True)
+class Sightings:
+    """Key points of a new camera that cameras with known poses see, too.
+
+    pixels (n, 2) in the new camera; depths (n,) along its z axis, as far as they are known. Of m sightings:
+    of (m,) which key point, seen (m, 2) its pixels in a camera of viewmats (m, 4, 4) and Ks (m, 3, 3).
+    """
+
+    pixels: Float[np.ndarray, "n 2"]
+    depths: Float[np.ndarray, " n"]
+    of: Int[np.ndarray, " m"]
+    seen: Float[np.ndarray, "m 2"]
+    viewmats: Float[np.ndarray, "m 4 4"]
+    Ks: Float[np.ndarray, "m 3 3"]
+
+
+def adjust_camera(
+    viewmat: Float[np.ndarray, "4 4"], K: Float[np.ndarray, "3 3"], sightings: Sightings
+) -> Float[np.ndarray, "4 4"]:
+    """The pose (4, 4) with which the key points, each at its own best depth, fall on their pixels in the
+    cameras that are known: bundle adjustment of one camera, with Cauchy's loss.
+
+    Depths that a layer says are right to some hundredths and wrong alike over a whole thing, which turns a
+    camera that is placed by them alone.
+
+    Args:
+        viewmat: nearly right, world to camera.
+    """
+    rays = np.column_stack((from_pixels(sightings.pixels, K), np.ones(len(sightings.pixels))))
+    known, viewmats = np.log(sightings.depths), sightings.viewmats
+    of, count, many = sightings.of, len(sightings.seen), len(known)
+
+    def pose(state: np.ndarray) -> np.ndarray:
+        moved = viewmat.copy()
+        moved[:3, :3] = Rotation.from_rotvec(state[:3]).as_matrix() @ viewmat[:3, :3]
+        moved[:3, 3] += state[3:6]
+        return moved
+
+    def residuals(state: np.ndarray) -> np.ndarray:
+        moved = pose(state)
+        points = (rays * np.exp(state[6:])[:, None] - moved[:3, 3]) @ moved[:3, :3]
+        there = np.einsum("mij,mj->mi", viewmats[:, :3, :3], points[of]) + viewmats[:, :3, 3]
+        x, y, z = (there[:, axis, None] for axis in range(3))
+        places = np.concatenate(to_pixels(x, y, np.maximum(z, 1e-9), sightings.Ks), 1)
+        apart = (places - sightings.seen).ravel() / ADDING.sigma
+        return np.concatenate((apart, (state[6:] - known) / ADDING.depth_sigma))
+
+    sparsity = lil_matrix((2 * count + many, 6 + many), dtype=int)
+    rows = np.arange(count)
+    sparsity[: 2 * count, :6] = 1
+    sparsity[2 * rows, 6 + of] = sparsity[2 * rows + 1, 6 + of] = 1
+    sparsity[2 * count + np.arange(many), 6 + np.arange(many)] = 1
+    start = np.concatenate((np.zeros(6), known))
+    found = least_squares(
+        residuals, start, jac_sparsity=sparsity, x_scale="jac", loss="cauchy", f_scale=ADDING.cauchy
+    )
+    return pose(found.x) if np.isfinite(found.x).all() else viewmat

@@ -7,7 +7,7 @@ has stays as it is, bit by bit.
 """
 
 import tempfile
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -18,7 +18,7 @@ from torch import Tensor
 
 from langflash_core.base.records import FoundFocal, FoundLens
 from langflash_core.cameras.keypoints import KeyPoints, match_sources
-from langflash_core.cameras.placing import place_camera
+from langflash_core.cameras.placing import Sightings, adjust_camera, place_camera
 from langflash_core.errors import InputError
 from langflash_core.geometry.cameras import fov_degrees
 from langflash_core.geometry.pinhole import from_pixels
@@ -26,6 +26,7 @@ from langflash_core.images.decode import PhotoFacts, read_photo
 from langflash_core.images.lens import exif_fov
 from langflash_core.images.settings import LENS_PRIOR, PHOTO_LIMITS
 from langflash_core.images.straight import straighten_views
+from langflash_core.images.triage import fov_notes
 from langflash_core.images.views import load_views
 from langflash_core.rig.settings import ADDING, MATCHING, PAIRING
 from langflash_core.surface.added import Shared, add_layers
@@ -66,6 +67,7 @@ def scene_with(
         fields = [max(fov_degrees(K, *size)) for K, size in zip(Ks, sizes, strict=True)]
         other = make(files, fields, poses)
     names = [path.name for path in files]
+    other = _without_lens_notes(other, zip(names, Ks, sizes, strict=True))
     other = _renamed(other, dict(zip(names[len(beside) :], (path.name for path in photos), strict=True)))
     return add_layers(scene, other, _shared(other, dict(zip(names, beside, strict=False))))
 
@@ -98,6 +100,12 @@ def _shared(other: Scene, numbers: Mapping[str, int]) -> Shared:
     return Shared(tuple(numbers[other.record.photos[view]] for view in theirs), tuple(theirs))
 
 
+def _without_lens_notes(scene: Scene, photos: Iterable[tuple[str, Tensor, tuple[int, int]]]) -> Scene:
+    """Nobody is told to use another lens where the scene knows this one; photos: name, K and size."""
+    notes = {line for name, K, size in photos for line in fov_notes(name, K, *size)}
+    return scene.with_record(warnings=tuple(line for line in scene.record.warnings if line not in notes))
+
+
 def _renamed(scene: Scene, names: Mapping[str, str]) -> Scene:
     """With people's names of photos, in what is said of them, too."""
     photos, warnings = list(scene.record.photos), list(scene.record.warnings)
@@ -126,27 +134,42 @@ class _Placed:
 
 
 def _place(scene: Scene, matches: KeyPoints, number: int, view: Views) -> _Placed:
-    """By the places that its key points have in the layers of the photos that have them, too."""
+    """By the places that its key points have in the layers of the photos that have them, too; then adjusted
+    with these places free."""
     row = scene.num_views + number
-    beside = sorted(range(scene.num_views), key=lambda other: -len(matches.pairs[other, row]))[
-        : ADDING.beside
-    ]
-    K = view.Ks[0].double().clone()
-    K[:2] *= MATCHING.working_side / max(view.size)
-    points, pixels = [], []
-    for other in beside:
-        ours, own = matches.pairs[other, row].T
-        points.append(_seen_at(scene, other, matches.positions[other][ours]))
-        pixels.append(matches.positions[row][own])
-    points, pixels = np.concatenate(points), np.concatenate(pixels)
+    counts = {other: len(matches.pairs[other, row]) for other in range(scene.num_views)}
+    beside = sorted(counts, key=lambda other: -counts[other])[: ADDING.beside]
+    ours, own = np.concatenate([matches.pairs[other, row] for other in beside]).T
+    views = np.repeat(beside, [counts[other] for other in beside])
+    seen = np.array([matches.positions[other][place] for other, place in zip(views, ours, strict=True)])
+    points = np.concatenate([_seen_at(scene, other, seen[views == other]) for other in beside])
+    K, pixels = _working_K(view.Ks[0], view.size), matches.positions[row][own]
     solid = np.isfinite(points).all(1)
-    placed = place_camera(points[solid], pixels[solid], K.numpy(), ADDING.misses)
+    placed = place_camera(points[solid], pixels[solid], K, ADDING.misses)
     if placed is None or placed.agree.sum() < PAIRING.few:
         raise InputError(
             f"{view.names[0]} could not be placed beside the scene's photos; take one that shows half of "
             "what one of them shows"
         )
-    return _Placed(torch.from_numpy(placed.viewmat), beside)
+    depths = points @ placed.viewmat[2, :3] + placed.viewmat[2, 3]
+    solid &= depths > 0
+    rows, of = np.unique(own[solid], return_inverse=True)
+    sightings = Sightings(
+        pixels=matches.positions[row][rows],
+        depths=np.array([np.median(depths[solid][of == number]) for number in range(len(rows))]),
+        of=of,
+        seen=seen[solid],
+        viewmats=scene.viewmats.double().numpy()[views[solid]],
+        Ks=np.stack([_working_K(K, scene.view_size) for K in scene.Ks])[views[solid]],
+    )
+    return _Placed(torch.from_numpy(adjust_camera(placed.viewmat, K, sightings)), beside)
+
+
+def _working_K(K: Float[Tensor, "3 3"], size: tuple[int, int]) -> Float[np.ndarray, "3 3"]:
+    """Of the photo at the size at which it is matched."""
+    working = K.double().numpy().copy()
+    working[:2] *= MATCHING.working_side / max(size)
+    return working
 
 
 def _seen_at(scene: Scene, view: int, pixels: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, "n 3"]:

@@ -439,9 +439,14 @@ class Adding:
     """Degrees by which recorded fields of view of one lens differ: of a millimetre of some 26, to which they
     are rounded."""
     misses: float = 2.0
-    """Pixels of the photo, 768 long, by which a point of the scene may miss its key point. The ninth
-    photo of a kitchen then stands .22 degrees and .3 % of the depth beside where all nine put it (4: .19 and
-    .4, 8: .23 and .6)."""
+    """Pixels of the photo, 768 long, by which a point of the scene may miss its key point at first."""
+    sigma: float = 1.0
+    """Pixels of the photo, 768 long, standard deviation of a key point."""
+    depth_sigma: float = 0.05
+    """Log depth that a layer may be off. The ninth photo of a kitchen then stands .02 degrees and .03 % of
+    the depth beside where all nine put it; .22 and .3 without adjustment."""
+    cauchy: float = 2.0
+    """Standard deviations from which a key point speaks less and less."""
     least: int = 6
     """Points that agree: fewer determine no pose beyond their own noise."""
 
