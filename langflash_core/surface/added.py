@@ -114,7 +114,6 @@ def _records(first: Scene, other: Scene, new: Sequence[int], shared: Shared, lig
     left_out = {name: value for name, value in ours.left_out.items() if name != "shares"}
     return {
         "photos": (*ours.photos, *names),
-        "counts": {name: count + theirs.counts.get(name, 0) for name, count in ours.counts.items()},
         "warnings": (*ours.warnings, *(line for line in said if line not in ours.warnings)),
         "light": light.stored(new) if ours.light or theirs.light else {},
         "foreseen": _with_rows(ours.foreseen, seen, ("covered", "alike", "nearest"), new),

@@ -36,7 +36,6 @@ def whole() -> Scene:
         light={"gains": GAINS.tolist(), "offsets": OFFSETS.tolist()},
         foreseen={"covered": [0.9, 0.8, 0.7], "alike": [0.6, None, 0.5], "nearest": [1, 0, 1]},
         detail={"photos_psnr_db": [40.0, 39.0, 38.0]},
-        counts={"predicted": 30, "covered": 27},
     )
     return replace(thrice, view_ids=torch.arange(3).repeat_interleave(count), record=record)
 
@@ -141,7 +140,6 @@ def test_the_record_speaks_of_all_photos(grown):
     assert record.foreseen["covered"] == [0.9, 0.8, 0.7] and record.foreseen["alike"] == [0.6, None, 0.5]
     assert record.foreseen["nearest"] == [1, 0, 1]  # of the other scene's numbers the first's
     assert record.detail["photos_psnr_db"] == [40.0, 39.0, 38.0]
-    assert record.counts == {"predicted": 60, "covered": 54}
     assert "shares" not in record.left_out
 
 
