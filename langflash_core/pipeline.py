@@ -3,6 +3,7 @@ part of the scene, and scene -> web page. Each reads in at its first call what t
 question waits for no network.
 """
 
+import math
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -10,7 +11,7 @@ from typing import TYPE_CHECKING
 import torch
 from torch import Tensor
 
-from langflash_core.base.detail import DEFAULT_DETAIL
+from langflash_core.base.detail import DEFAULT_DETAIL, DETAILS
 from langflash_core.base.resources import asset_path
 from langflash_core.base.running import Progress, Run
 from langflash_core.errors import InputError, ViewError
@@ -139,7 +140,7 @@ def add_photos(
     """A finished scene with a layer of each of some more photos; what it has stays as it is.
 
     Each photo is reconstructed with the four of the scene's that show most of the same, which the file keeps,
-    so that it costs five photos' time however many the scene has. What it says is in atoms of its own.
+    so that it costs five photos' time, and being matched with all. What it says is in atoms of its own.
 
     Args:
         scene: of layers, or the path of one. photos: of the same place. The others as `reconstruct`.
@@ -152,19 +153,23 @@ def add_photos(
     from langflash_core.reconstruction.adding import scene_with
 
     scene = open_scene(scene)
+    width, height = scene.view_size
+    level = scene.record.detail.get("level")
 
     def make(files: Sequence[Path], fields: Sequence[float], poses: Tensor) -> Scene:
         return reconstruct(
             files,
             fov=fields,
             viewmats=poses,
+            size=round(math.sqrt(width * height)),
+            detail=level if level in DETAILS else DEFAULT_DETAIL,
             device=device,
             progress=progress,
             cancelled=cancelled,
             networks=networks,
         )
 
-    return scene_with(scene, photo_paths(photos), make)
+    return scene_with(scene, photo_paths(photos), make, Run({}, progress, cancelled).check)
 
 
 def query(

@@ -44,16 +44,17 @@ def place_camera(
     unit = spread if spread > 0 else 1.0
     cv2.setRNGSeed(0)
     found, turn, shift, inliers = cv2.solvePnPRansac(
-        points / unit, pixels, K, None,
+        (points - middle) / unit, pixels, K, None,
         iterationsCount=200, reprojectionError=tolerance, confidence=0.9999, flags=cv2.SOLVEPNP_SQPNP,
     )  # fmt: skip
     if not found or inliers is None or len(inliers) < ADDING.least:
         return None
     agree = np.zeros(len(points), dtype=bool)
     agree[inliers[:, 0].astype(np.int64)] = True
-    turn, shift = cv2.solvePnPRefineLM(points[agree] / unit, pixels[agree], K, None, turn, shift)
+    turn, shift = cv2.solvePnPRefineLM((points[agree] - middle) / unit, pixels[agree], K, None, turn, shift)
     viewmat = np.eye(4)
-    viewmat[:3, :3], viewmat[:3, 3] = cv2.Rodrigues(turn)[0], shift[:, 0] * unit
+    viewmat[:3, :3] = cv2.Rodrigues(turn)[0]
+    viewmat[:3, 3] = shift[:, 0] * unit - viewmat[:3, :3] @ middle
     return Placed(viewmat, agree) if np.isfinite(viewmat).all() else None
 
 

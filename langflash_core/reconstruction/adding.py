@@ -1,4 +1,4 @@
-"""One photo more for a finished scene, for the price of some photos, however many the scene has.
+"""Photos more for a finished scene, each for the price of itself and four others, however many there are.
 
 The photos that show most of the same as the new one lie in the scene's file, as they were reconstructed, and
 their layers say where what they show is: that places the new camera. With these poses they and the new photo
@@ -6,8 +6,9 @@ make a small scene in the same world, whose new layer then joins the others (`su
 has stays as it is, bit by bit.
 """
 
+import math
 import tempfile
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -24,11 +25,14 @@ from langflash_core.geometry.cameras import fov_degrees
 from langflash_core.geometry.pinhole import from_pixels
 from langflash_core.images.decode import PhotoFacts, read_photo
 from langflash_core.images.lens import exif_fov
+from langflash_core.images.pictures import centre_box, photo_names
 from langflash_core.images.settings import LENS_PRIOR, PHOTO_LIMITS
 from langflash_core.images.straight import straighten_views
 from langflash_core.images.triage import fov_notes
 from langflash_core.images.views import load_views
-from langflash_core.rig.settings import ADDING, MATCHING, PAIRING
+from langflash_core.network.presets import PRESETS
+from langflash_core.rig.settings import ADDING, MATCHING
+from langflash_core.scene.settings import JOINING
 from langflash_core.surface.added import Shared, add_layers
 from langflash_core.surface.foreseen import CELL, draw_points
 from langflash_core.types import Lenses, Scene, Views
@@ -42,7 +46,8 @@ def scene_with(
     """The scene with layers of photos more.
 
     Args:
-        make: photos, the fields of view of their longer sides and their poses to a scene in that world.
+        make: photos, the fields of view of their longer sides and their poses to a scene in that world, with
+            views of the scene's size.
         check: called between photos; what it raises ends the work.
 
     Raises:
@@ -61,27 +66,39 @@ def scene_with(
     sizes = [*(scene.view_size for _ in beside), *(view.size for view in views)]
     poses = torch.stack([*scene.viewmats[beside].double(), *(one.viewmat for one in placed)])
     with tempfile.TemporaryDirectory(prefix="langflash-") as folder:
-        files = [Path(folder) / f"{place}.jpg" for place in range(len(sources))]
+        files = [Path(folder) / f"photo~{place:03}~.jpg" for place in range(len(sources))]
         for path, source in zip(files, sources, strict=True):
             path.write_bytes(source)
         fields = [max(fov_degrees(K, *size)) for K, size in zip(Ks, sizes, strict=True)]
         other = make(files, fields, poses)
     names = [path.name for path in files]
     other = _without_lens_notes(other, zip(names, Ks, sizes, strict=True))
-    other = _renamed(other, dict(zip(names[len(beside) :], (path.name for path in photos), strict=True)))
-    return add_layers(scene, other, _shared(other, dict(zip(names, beside, strict=False))))
+    ours = [scene.record.photos[view] for view in beside]
+    other = _rename(other, names, [*ours, *photo_names(list(photos))], len(beside))
+    return add_layers(scene, other, Shared(tuple(beside), tuple(range(len(beside)))))
 
 
 def _view(scene: Scene, path: Path, check: Callable[[], None]) -> Views:
     """A new photo as the scene's were taken: with their lens, straightened as they were."""
-    lens = _lens(scene, read_photo(path).facts)
-    field = max(fov_degrees(scene.Ks[0], *scene.view_size)) if lens is None else lens.fov
-    width, height = scene.view_size
-    views = load_views([path], fov=field, area=width * height, multiple=1, check=check)
+    photo = read_photo(path).facts
+    lens, (width, height) = _lens(scene, photo), scene.view_size
+    field = _field_like_the_first(scene, photo) if lens is None else lens.fov
+    patch = PRESETS["mini"].patch  # sides of which photos keep most pixels
+    views = load_views([path], fov=field, area=width * height, multiple=patch, check=check)
     if lens is None or not lens.bend:
         return views
     views = replace(views, lenses=Lenses((0,), (field,), (0.0,), (False,)))
     return straighten_views(views, [FoundFocal(1.0, 0.0, lens.photos, lens.bend)])
+
+
+def _field_like_the_first(scene: Scene, photo: PhotoFacts) -> float:
+    """Degrees of the longer side of a photo that the lens of the scene's first one took, cropped as that."""
+    size = scene.view_size
+    if (size[0] > size[1]) != (photo.width > photo.height):
+        size = (size[1], size[0])
+    left, _, right, _ = centre_box(photo.width, photo.height, size)
+    focal = float(scene.Ks[0, 0, 0]) * (right - left) / size[0]
+    return math.degrees(2 * math.atan(max(photo.width, photo.height) / (2 * focal)))
 
 
 def _lens(scene: Scene, photo: PhotoFacts) -> FoundLens | None:
@@ -89,15 +106,10 @@ def _lens(scene: Scene, photo: PhotoFacts) -> FoundLens | None:
     nothing."""
     said = exif_fov(photo)
     for known in scene.record.lens.get("found", ()):
-        if abs(known["said"] - (LENS_PRIOR.assumed_fov if said is None else said)) < ADDING.same_lens:
+        own = LENS_PRIOR.assumed_fov if said is None else said
+        if known["recorded"] == (said is not None) and abs(known["said"] - own) < ADDING.same_lens:
             return FoundLens(**known)
     return None if said is None else FoundLens(said, 0.0, 1, said, True)
-
-
-def _shared(other: Scene, numbers: Mapping[str, int]) -> Shared:
-    """Photos of the scene that the other has as well; numbers: theirs in the scene, by name."""
-    theirs = [view for view, name in enumerate(other.record.photos) if name in numbers]
-    return Shared(tuple(numbers[other.record.photos[view]] for view in theirs), tuple(theirs))
 
 
 def _without_lens_notes(scene: Scene, photos: Iterable[tuple[str, Tensor, tuple[int, int]]]) -> Scene:
@@ -106,23 +118,29 @@ def _without_lens_notes(scene: Scene, photos: Iterable[tuple[str, Tensor, tuple[
     return scene.with_record(warnings=tuple(line for line in scene.record.warnings if line not in notes))
 
 
-def _renamed(scene: Scene, names: Mapping[str, str]) -> Scene:
-    """With people's names of photos, in what is said of them, too."""
-    photos, warnings = list(scene.record.photos), list(scene.record.warnings)
-    for held, name in names.items():
-        photos = [name if photo == held else photo for photo in photos]
-        warnings = [line.replace(held, name) for line in warnings]
-    return scene.with_record(photos=tuple(photos), warnings=tuple(warnings))
+def _rename(scene: Scene, held: Sequence[str], names: Sequence[str], ours: int) -> Scene:
+    """With people's names of photos; of what is said that which speaks of others than the first `ours`."""
+    told = [line for line in scene.record.warnings if any(name in line for name in held[ours:])]
+    for name, own in zip(held, names, strict=True):  # of one length, so that none is part of another
+        told = [line.replace(name, own) for line in told]
+    return scene.with_record(photos=tuple(names), warnings=tuple(told))
 
 
 def _check(scene: Scene, count: int) -> None:
     if not scene.layered or not scene.photos:
         raise InputError(
-            "this scene keeps no layer and picture of each photo; reconstruct it again with all photos"
+            "this scene keeps no layer and picture of each photo, as those of two photos and the preset mini "
+            "do; reconstruct it again with all photos"
         )
     whole, most = scene.num_views + count, PHOTO_LIMITS.max_photos
     if whole > most:
         raise InputError(f"{whole} photos are too many; a scene has at most {most} of them")
+    atoms = scene.semantics.num_atoms
+    if atoms + PRESETS["mini"].splitting.max_parts > JOINING.most_atoms:
+        raise InputError(
+            f"the scene has {atoms} groups, too many for those of another photo; reconstruct it again with "
+            "all photos"
+        )
 
 
 @dataclass(frozen=True)
@@ -146,7 +164,7 @@ def _place(scene: Scene, matches: KeyPoints, number: int, view: Views) -> _Place
     K, pixels = _working_K(view.Ks[0], view.size), matches.positions[row][own]
     solid = np.isfinite(points).all(1)
     placed = place_camera(points[solid], pixels[solid], K, ADDING.misses)
-    if placed is None or placed.agree.sum() < PAIRING.few:
+    if placed is None or placed.agree.sum() < ADDING.enough:
         raise InputError(
             f"{view.names[0]} could not be placed beside the scene's photos; take one that shows half of "
             "what one of them shows"
@@ -175,7 +193,9 @@ def _working_K(K: Float[Tensor, "3 3"], size: tuple[int, int]) -> Float[np.ndarr
 def _seen_at(scene: Scene, view: int, pixels: Float[np.ndarray, "n 2"]) -> Float[np.ndarray, "n 3"]:
     """Points of the world that a photo's own layer shows at key points (`KeyPoints.positions`); no numbers
     where it shows none. The layer says how far away they are, the pixels in which direction."""
-    means, camera = scene.layer(view).gaussians.means.T, scene.camera(view)
+    assert scene.view_ids is not None, "scenes of layers know which photo made what"
+    gaussians, camera = scene.gaussians, scene.camera(view)
+    means = gaussians.means[(scene.view_ids == view) & (gaussians.opacities > ADDING.solid)].T
     viewmat, pixels = camera.viewmat.double().numpy(), pixels * (max(scene.view_size) / MATCHING.working_side)
     points, nearest = draw_points(means, means, camera)
     places = torch.from_numpy(pixels / CELL).long()

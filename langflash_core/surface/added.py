@@ -35,7 +35,10 @@ def add_layers(first: Scene, other: Scene, shared: Shared) -> Scene:
 
     Raises:
         InputError: they speak different languages, or have too many atoms together.
+        ValueError: their views have other sizes.
     """
+    if first.view_size != other.view_size:
+        raise ValueError(f"other: expected views of {first.view_size}, received {other.view_size}")
     new = [view for view in range(other.num_views) if view not in shared.theirs]
     part, light = _layers_of(other, new), _common_light(first, other, shared)
     part = replace(part, gaussians=light.of_colours(part.gaussians))
@@ -47,7 +50,7 @@ def _layers_of(scene: Scene, views: Sequence[int]) -> Scene:
     assert scene.view_ids is not None, "scenes of layers know which photo made what"
     numbers = torch.full((scene.num_views,), -1)
     numbers[list(views)] = torch.arange(len(views))
-    part = sparser(scene.rows(numbers[scene.view_ids] >= 0))
+    part = sparser(scene.rows((scene.view_ids >= 0) & (numbers[scene.view_ids] >= 0)))
     assert part.view_ids is not None, "rows keep them"
     return replace(
         part,
@@ -105,7 +108,6 @@ def _records(first: Scene, other: Scene, new: Sequence[int], shared: Shared, lig
     """What the record says of photos one by one, of all of them; rows that one of both lacks go."""
     ours, theirs = first.record, other.record
     names = [theirs.photos[view] for view in new]
-    said = [line for line in theirs.warnings if any(name in line for name in names)]
     numbers = dict(zip(shared.theirs, shared.ours, strict=True))
     numbers |= {view: first.num_views + place for place, view in enumerate(new)}
     seen = {**theirs.foreseen, "nearest": [numbers[view] for view in theirs.foreseen.get("nearest", ())]}
@@ -114,7 +116,7 @@ def _records(first: Scene, other: Scene, new: Sequence[int], shared: Shared, lig
     left_out = {name: value for name, value in ours.left_out.items() if name != "shares"}
     return {
         "photos": (*ours.photos, *names),
-        "warnings": (*ours.warnings, *(line for line in said if line not in ours.warnings)),
+        "warnings": (*ours.warnings, *(line for line in theirs.warnings if line not in ours.warnings)),
         "light": light.stored(new) if ours.light or theirs.light else {},
         "foreseen": _with_rows(ours.foreseen, seen, ("covered", "alike", "nearest"), new),
         "left_out": left_out | ({"shares": shares} if any(shares) else {}),

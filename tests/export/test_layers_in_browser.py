@@ -74,9 +74,10 @@ def room_in_layers(num_views: int = NUM_VIEWS) -> Scene:
 
 @pytest.fixture(scope="module", autouse=True)
 def _few_words() -> Iterator[None]:
-    """A vocabulary that takes no seconds to encode."""
+    """A vocabulary that takes no seconds to encode, of more words than a pass takes."""
+    words = (*PHRASES, "door", "window", "rug", "shelf", "lamp", "desk")
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(pipeline, "all_phrases", lambda: PHRASES)
+        patch.setattr(pipeline, "all_phrases", lambda: words)
         yield
 
 

@@ -145,12 +145,10 @@ def test_the_record_speaks_of_all_photos(grown):
 
 def test_what_was_left_out_of_one_scene_alone_is_kept(scenes):
     _, first, other = scenes
-    other = other.with_record(
-        left_out={"shares": [0.0, 0.0, 0.25]}, warnings=("right.jpg is blurred", "dark")
-    )
+    other = other.with_record(left_out={"shares": [0.0, 0.0, 0.25]}, warnings=("right.jpg is blurred",))
     grown = add_layers(first, other, SHARED)
     assert grown.record.left_out["shares"] == [0.0, 0.0, 0.25]
-    assert grown.record.warnings == ("right.jpg is blurred",)  # the rest is said of photos that it has
+    assert grown.record.warnings == ("right.jpg is blurred",)
 
 
 def test_two_languages_do_not_mix(scenes):
@@ -160,3 +158,17 @@ def test_two_languages_do_not_mix(scenes):
     spoken = replace(other, semantics=replace(other.semantics, space="clip"))
     with pytest.raises(InputError, match="speaks clip"):
         add_layers(first, spoken, SHARED)
+
+
+def test_what_no_photo_made_stays_with_its_own_scene(scenes, grown):
+    """Fillings and merged things have the view -1, which numbers no photo."""
+    _, first, other = scenes
+    assert other.view_ids is not None
+    ids = torch.where(torch.arange(len(other.view_ids)) < 7, -1, other.view_ids)
+    assert len(add_layers(first, replace(other, view_ids=ids), SHARED).gaussians) == len(grown.gaussians)
+
+
+def test_views_of_another_size_are_our_own_mistake(scenes):
+    _, first, other = scenes
+    with pytest.raises(ValueError, match="expected views of"):
+        add_layers(first, replace(other, view_size=(48, 36)), SHARED)

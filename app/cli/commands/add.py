@@ -19,7 +19,7 @@ def run(args: Namespace, out: TextIO) -> None:
     start = time.perf_counter()
     checked_scene(args.scene)
     photos = checked_photos(args.photos)
-    check_output_file(args.output, (".langflash",), inputs=photos)
+    check_output_file(args.output, (".langflash",), inputs=[args.scene, *photos])
     from langflash_core import pipeline
     from langflash_core.scene.file import load, save
     from langflash_core.scene.report import describe

@@ -14,7 +14,7 @@ from tests.app.cli.conftest import stripes
 
 @pytest.fixture(scope="module")
 def photos(tmp_path_factory):
-    """A desk from two places, small, and the right one again in another file."""
+    """A desk from two places, small, and the right one again, in a file that is called as ours could be."""
     folder = tmp_path_factory.mktemp("desk")
     for name in ("left", "right"):
         with Image.open(asset_path(f"photos/desk_{name}.png")) as picture:
@@ -22,7 +22,7 @@ def photos(tmp_path_factory):
             picture.thumbnail((480, 480))
             picture.save(folder / f"{name}.jpg", quality=95)
             if name == "right":
-                picture.save(folder / "again.jpg", quality=85)
+                picture.save(folder / "1.jpg", quality=85)
     return folder
 
 
@@ -31,20 +31,24 @@ def scene(photos, tmp_path_factory):
     from langflash_core.pipeline import reconstruct
 
     path = tmp_path_factory.mktemp("scene") / "desk.langflash"
-    save(reconstruct([photos / "left.jpg", photos / "right.jpg"], detail="low"), path)
+    save(reconstruct([photos / "left.jpg", photos / "right.jpg"], detail="low", size=196), path)
     return path
 
 
 def test_a_photo_taken_again_stands_where_it_stood(run, scene, photos, tmp_path):
     output = tmp_path / "more.langflash"
-    outcome = run("add", scene, photos / "again.jpg", "-o", output)
+    outcome = run("add", scene, photos / "1.jpg", "-o", output)
     assert outcome.code == 0, outcome.err
     assert "1 photo more, 3 in all" in outcome.out
     before, after = load(scene), load(output)
-    assert after.record.photos == ("left.jpg", "right.jpg", "again.jpg") and len(after.photos) == 3
+    assert after.record.photos == ("left.jpg", "right.jpg", "1.jpg") and len(after.photos) == 3
+    assert (after.view_size, after.record.detail["level"]) == (before.view_size, "low")
+    assert torch.allclose(
+        after.Ks[2], after.Ks[1], rtol=0.02
+    )  # in pixels of one size, the lens assumed alike
     count = len(before.gaussians)
     assert torch.equal(after.gaussians.means[:count], before.gaussians.means)
-    assert len(after.gaussians) > 1.2 * count  # a layer like the other two
+    assert 1.2 * count < len(after.gaussians) < 1.8 * count  # a layer like the other two
     # Key points of a copy are the same but for JPEG's noise, a tenth of a pixel at a focal length of 650:
     # what is left are the layer's depths, right to a hundredth, of things a unit away.
     moved = after.viewmats[2] - after.viewmats[1]
@@ -66,6 +70,13 @@ def test_a_photo_of_another_place_is_refused(run, scene, tmp_path):
 def test_a_scene_without_layers_is_refused_with_a_remedy(run, photos, tmp_path):
     path, output = tmp_path / "plain.langflash", tmp_path / "more.langflash"
     save(stripes(), path)
-    outcome = run("add", path, photos / "again.jpg", "-o", output)
+    outcome = run("add", path, photos / "1.jpg", "-o", output)
     assert outcome.code == 2 and not output.exists()
-    assert "keeps no layer and picture of each photo; reconstruct it again" in outcome.err
+    assert "keeps no layer and picture of each photo, as those" in outcome.err
+    assert "; reconstruct it again with all photos" in outcome.err
+
+
+def test_a_scene_is_not_written_over_by_what_was_added_to_it(run, scene, photos):
+    before = scene.read_bytes()
+    outcome = run("add", scene, photos / "1.jpg", "-o", scene)
+    assert outcome.code == 2 and scene.read_bytes() == before

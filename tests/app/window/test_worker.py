@@ -80,6 +80,11 @@ class Kept(Command):
         return state
 
 
+def compiled(worker: Worker) -> list[ask.PhrasesCompiled]:
+    """Phrases that came, without where they are answered."""
+    return [each for each in wait_for(worker, ask.PhrasesCompiled) if isinstance(each, ask.PhrasesCompiled)]
+
+
 def test_tensors_of_tasks_within_a_prediction_can_be_changed_after_it(worker: Worker) -> None:
     worker.submit(Predicting())
     wait_for(worker, show.Progressed)
@@ -95,18 +100,18 @@ def test_a_scene_is_loaded_and_phrases_are_scored(worker: Worker, scene_file: Pa
     assert (info.num_atoms, len(info.views), info.path) == (3, 2, scene_file)
     texts = ("armchair", "elephant")
     worker.submit(Encode(info.serial, info.scene, (4, 9), texts, ()))
-    compiled = wait_for(worker, ask.PhrasesCompiled)[-1]
-    assert compiled.keys == (4, 9)
+    phrases = compiled(worker)[-1]
+    assert phrases.keys == (4, 9)
     camera = info.scene.camera(0, 112, 84)
     frame = render(info.scene, camera)
     assert frame.weight_maps is not None
-    relevance = relevance_maps(frame.weight_maps, compiled.query)
-    worker.submit(Answer(info.serial, (4, 9), relevance, frame, camera, compiled.query))
+    relevance = relevance_maps(frame.weight_maps, phrases.query)
+    worker.submit(Answer(info.serial, (4, 9), relevance, frame, camera, phrases.query))
     scored = wait_for(worker, ask.Answered)  # and histograms, perhaps in the same moment
     scores = next(each for each in scored if isinstance(each, ask.Answered)).scores
-    chair, elephant = answer(relevance, frame, camera, compiled.query).answers
+    chair, elephant = answer(relevance, frame, camera, phrases.query).answers
     assert scores == ((4, "armchair", chair.score), (9, "elephant", elephant.score))
-    assert chair.score >= compiled.query.threshold > elephant.score
+    assert chair.score >= phrases.query.threshold > elephant.score
 
 
 def test_a_splat_file_is_opened_saved_and_said_to_be_mute(
@@ -137,9 +142,9 @@ def test_only_the_newest_prompts_are_encoded(worker: Worker, scene_file: Path) -
     typed = "an armchair by the window"
     for end in range(1, len(typed) + 1):
         worker.submit(Encode(1, scene, (0,), (typed[:end],), ()))
-    results = wait_for(worker, ask.PhrasesCompiled)
+    results = compiled(worker)
     while results[-1].query.texts != (typed,):
-        results += wait_for(worker, ask.PhrasesCompiled)
+        results += compiled(worker)
     # Submitting takes microseconds and encoding milliseconds: most keystrokes are passed over.
     assert len(results) < len(typed) / 2
 

@@ -188,7 +188,7 @@ def test_the_gizmo_stands_where_the_picture_shows_the_thing(chosen: State, paral
 def test_the_oldest_step_that_falls_off_is_told_once(chosen: State, monkeypatch) -> None:
     monkeypatch.setattr(core, "MOST_EDITS", 3)
     bounded = core.History.drop_oldest
-    monkeypatch.setattr(core.History, "bounded", lambda self: bounded(self, most_edits=3))
+    monkeypatch.setattr(core.History, "drop_oldest", lambda self: bounded(self, most_edits=3))
     told = 0
     for _ in range(6):
         before = chosen.toasts
