@@ -1,5 +1,7 @@
 """3DGS PLY: written as others read it, read as others write it, refused where it is damaged."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 import torch
@@ -8,6 +10,7 @@ import trimesh
 from langflash_core.base.files import write_atomically
 from langflash_core.errors import SceneFileError
 from langflash_core.export import export, read
+from langflash_core.export.settings import STORED
 from langflash_core.scene.bare import bare_scene
 from langflash_core.scene.checks import check_scene
 from tests.export.splats import damaged_files, ply_bytes, random_gaussians, stored_columns
@@ -178,7 +181,7 @@ def test_damaged_files_are_refused_in_one_sentence(tmp_path, kind):
 def test_more_rows_than_are_read_at_once(tmp_path, monkeypatch):
     whole = read(written(tmp_path, random_gaussians(1000, 1))).gaussians
     for module in ("ply", "stored"):
-        monkeypatch.setattr(f"langflash_core.export.{module}.ROWS_AT_ONCE", 64)
+        monkeypatch.setattr(f"langflash_core.export.{module}.STORED", replace(STORED, rows_at_once=64))
     in_parts = read(written(tmp_path, random_gaussians(1000, 1))).gaussians
     for name, values in vars(whole).items():
         assert torch.equal(values, getattr(in_parts, name)), name

@@ -3,6 +3,7 @@
 import io
 import json
 import struct
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -296,7 +297,7 @@ def test_what_is_written_begins_in_every_trainer(tmp_path, scene, monkeypatch):
     shades = torch.tensor([[int(word) for word in row[4:7]] for row in rows])
     expected = (0.5 + 0.28209479 * scene.gaussians.sh[solid, 0]).clamp(0, 1) * 255
     assert float((shades - expected).abs().max()) <= 0.5 + 1e-3  # rounded to whole numbers
-    monkeypatch.setattr("langflash_core.export.cameras.MOST_POINTS", 2)
+    monkeypatch.setattr("langflash_core.export.cameras.POINT_CLOUD", replace(POINT_CLOUD, most_points=2))
     export(scene, tmp_path / "cameras.txt")
     assert 1 <= len((tmp_path / "points3D.txt").read_text().splitlines()) - 1 <= 2
     assert POINT_CLOUD.most_points >= 10_000 and len(random_gaussians(5)) == len(scene.gaussians)
