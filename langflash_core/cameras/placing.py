@@ -13,7 +13,7 @@ from scipy.optimize import least_squares
 from scipy.sparse import lil_matrix
 from scipy.spatial.transform import Rotation
 
-from langflash_core.geometry.pinhole import from_pixels, to_pixels
+from langflash_core.geometry.pinhole import from_pixels, see_each
 from langflash_core.rig.settings import ADDING
 
 
@@ -87,7 +87,7 @@ def adjust_camera(
         viewmat: nearly right, world to camera.
     """
     rays = np.column_stack((from_pixels(sightings.pixels, K), np.ones(len(sightings.pixels))))
-    known, viewmats = np.log(sightings.depths), sightings.viewmats
+    known = np.log(sightings.depths)
     of, count, many = sightings.of, len(sightings.seen), len(known)
 
     def pose(state: np.ndarray) -> np.ndarray:
@@ -99,9 +99,7 @@ def adjust_camera(
     def residuals(state: np.ndarray) -> np.ndarray:
         moved = pose(state)
         points = (rays * np.exp(state[6:])[:, None] - moved[:3, 3]) @ moved[:3, :3]
-        there = np.einsum("mij,mj->mi", viewmats[:, :3, :3], points[of]) + viewmats[:, :3, 3]
-        x, y, z = (there[:, axis, None] for axis in range(3))
-        places = np.concatenate(to_pixels(x, y, np.maximum(z, 1e-9), sightings.Ks), 1)
+        places = see_each(points[of], sightings.viewmats, sightings.Ks)
         apart = (places - sightings.seen).ravel() / ADDING.sigma
         return np.concatenate((apart, (state[6:] - known) / ADDING.depth_sigma))
 

@@ -55,3 +55,12 @@ def see(
     depths = np.ones(1) if orthographic else np.where(ahead, z, np.inf)
     x, y = to_pixels(x, y, depths, K)
     return Seen(x, y, z, ahead & (x >= 0) & (y >= 0) & (x < size[0]) & (y < size[1]))
+
+
+def see_each(
+    points: Float[np.ndarray, "n 3"], viewmats: Float[np.ndarray, "n 4 4"], Ks: Float[np.ndarray, "n 3 3"]
+) -> Float[np.ndarray, "n 2"]:
+    """Pixels (n, 2) of points of the world, each in a camera of its own; far outside of what is behind."""
+    there = np.einsum("nij,nj->ni", viewmats[:, :3, :3], points) + viewmats[:, :3, 3]
+    x, y, z = (there[:, axis, None] for axis in range(3))
+    return np.concatenate(to_pixels(x, y, np.maximum(z, 1e-9), Ks), 1)

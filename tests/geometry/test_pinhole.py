@@ -5,7 +5,7 @@ import pytest
 import torch
 
 from langflash_core.geometry.cameras import intrinsics_from_fov
-from langflash_core.geometry.pinhole import from_pixels, see
+from langflash_core.geometry.pinhole import from_pixels, see, see_each
 from langflash_core.rig.projected import project_points
 from tests.geometry.twins import seen_at
 
@@ -55,3 +55,15 @@ def test_back_from_pixels():
     rays = torch.cat((from_pixels(pixels, K), torch.ones(2, 1)), 1)
     assert torch.allclose(seen_at(3 * rays, K), pixels, atol=1e-12)  # rounding of tens
     assert np.array_equal(from_pixels(pixels.numpy(), K.numpy()), rays[:, :2])
+
+
+def test_each_point_in_a_camera_of_its_own_is_seen_as_in_that_camera():
+    rng = np.random.default_rng(3)
+    points, viewmats = rng.normal(size=(4, 3)) + np.array([0, 0, 4]), np.repeat(np.eye(4)[None], 4, 0)
+    viewmats[:, :3, 3] = 0.1 * rng.normal(size=(4, 3))
+    K = np.array([[60.0, 0, 48], [0, 50, 36], [0, 0, 1]])
+    each = see_each(points, viewmats, np.repeat(K[None], 4, 0))
+    for point, viewmat, pixel in zip(points, viewmats, each, strict=True):
+        alone = see(point[None], viewmat, K, (96, 72))
+        assert np.allclose(pixel, (alone.x[0], alone.y[0]), rtol=1e-12)  # the same sums in another order
+    assert np.abs(see_each(-points, viewmats, np.repeat(K[None], 4, 0))).min() > 1e6  # behind: far outside
