@@ -164,7 +164,7 @@ def _place(scene: Scene, matches: KeyPoints, number: int, view: Views) -> _Place
     K, pixels = _working_K(view.Ks[0], view.size), matches.positions[row][own]
     solid = np.isfinite(points).all(1)
     placed = place_camera(points[solid], pixels[solid], K, ADDING.misses)
-    if placed is None or placed.agree.sum() < ADDING.enough:
+    if placed is None or placed.agree.sum() < MATCHING.fewest:
         raise InputError(
             f"{view.names[0]} could not be placed beside the scene's photos; take one that shows half of "
             "what one of them shows"

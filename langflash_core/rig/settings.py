@@ -449,8 +449,6 @@ class Adding:
     """Standard deviations from which a key point speaks less and less."""
     least: int = 6
     """Points that agree: fewer determine no pose beyond their own noise."""
-    enough: int = 40
-    """Points that agree, for a photo that shows the same place: other places have had a dozen by chance."""
     solid: float = 0.5
     """Opacity from which a Gaussian is a surface."""
 

@@ -49,8 +49,8 @@ def test_a_photo_taken_again_stands_where_it_stood(run, scene, photos, tmp_path)
     count = len(before.gaussians)
     assert torch.equal(after.gaussians.means[:count], before.gaussians.means)
     assert 1.2 * count < len(after.gaussians) < 1.8 * count  # a layer like the other two
-    # Key points of a copy are the same but for JPEG's noise, a tenth of a pixel at a focal length of 650:
-    # what is left are the layer's depths, right to a hundredth, of things a unit away.
+    # Key points of a copy are the same but for JPEG's noise, a tenth of a pixel at a focal length of 650. A
+    # place along the rays of two photos is known from the layer's depths, right to a hundredth.
     moved = after.viewmats[2] - after.viewmats[1]
     assert float(moved[:3, :3].abs().max()) < 0.005 and float(moved[:3, 3].abs().max()) < 0.01
     with Image.open(io.BytesIO(after.photos[2])) as picture:

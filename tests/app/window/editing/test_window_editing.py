@@ -250,6 +250,7 @@ def test_a_thing_is_hidden_for_good_and_brought_back_until_it_is_saved(program: 
     program.xdotool("mousemove", str(right - 30), str((top + bottom) // 2), "click", "1")
     program.until(lambda s: s["margin"] > 0.15 and s["hides"] > 1.2 * few, "a wider margin")
     program.at_rest()
+    # The ring of a wider margin, 1,600 pixels and more; none where nothing turns red.
     assert reddened(program.picture(), narrow) > 1000, "what goes with it is red, and at once"
     program.click("##for good")
     state = program.until(lambda s: s["unhidden"] and s["job"] is None, "the hidden scene")
