@@ -104,6 +104,19 @@ class Lenses:
     straightened: tuple[FoundFocal | None, ...] = ()
     straight: bool = False
 
+    def some(self, photos: Sequence[int]) -> "Lenses":
+        """Of these photos alone; lenses that took none of them go."""
+        kept = list(dict.fromkeys(self.of[photo] for photo in photos))
+        return replace(
+            self,
+            of=tuple(kept.index(self.of[photo]) for photo in photos),
+            **{
+                name: tuple(getattr(self, name)[lens] for lens in kept)
+                for name in ("fovs", "doubts", "recorded", "straightened")
+                if getattr(self, name)
+            },
+        )
+
     def found(self, told: Sequence[FoundFocal | None]) -> tuple[FoundLens, ...]:
         """The lenses that photos told."""
         found = []
@@ -145,6 +158,32 @@ class Views:
     lenses: Lenses | None = None
 
     __repr__ = _brief
+
+    def some(self, photos: Sequence[int]) -> "Views":
+        """These photos alone, in this order; the world stays the one of the poses.
+
+        Raises:
+            ValueError: poses are given, and these photos leave out the first, whose camera is the world.
+        """
+        rows = list(photos)
+        if self.viewmats is not None and rows[:1] != [0]:
+            raise ValueError("photos: expected 0 first, whose camera is the world of the poses")
+        names = tuple(self.names[row] for row in rows)
+        lenses = None if self.lenses is None else self.lenses.some(rows)
+        if lenses is not None and not any(name in lenses.note for name in names):
+            lenses = replace(lenses, note="")
+        note, gone = lenses and lenses.note, set(self.names) - set(names)
+        return Views(
+            images=self.images[rows],
+            Ks=self.Ks[rows],
+            names=names,
+            sources=tuple(self.sources[row] for row in rows) if self.sources else (),
+            warnings=tuple(
+                line for line in self.warnings if line == note or not any(name in line for name in gone)
+            ),
+            viewmats=None if self.viewmats is None else self.viewmats[rows],
+            lenses=lenses,
+        )
 
     @property
     def num_views(self) -> int:

@@ -146,6 +146,16 @@ def test_the_weight_maps_of_photos_are_gone_when_colours_are_solved_for(weights,
     assert left == [None]
 
 
+def test_a_stage_that_leaves_photos_out_gives_the_scene_of_the_others(monkeypatch, weights, photos, scene):
+    """Key points of all photos were found beside; those of the others are found again."""
+    loaded = stages.load_views
+    monkeypatch.setattr(stages, "load_views", lambda *args, **kwargs: loaded(*args, **kwargs).some([0, 1]))
+    third = asset_path("photos/aloe_left.jpg")
+    fewer = lf.reconstruct([*photos, third], weights=weights, size=SMALL)
+    assert fewer.record.photos == scene.record.photos
+    assert (fewer.gaussians.means == scene.gaussians.means).all()
+
+
 def test_the_lens_is_taken(weights, photos):
     wide = lf.reconstruct(photos[:1], weights=weights, size=SMALL, fov=90)
     longer = max(wide.view_size)

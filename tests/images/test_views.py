@@ -128,6 +128,26 @@ def test_exif_decides_when_nothing_is_given(tmp_path):
     assert not [note for note in load_views([unknown], fov=60).warnings if "assumed" in note]
 
 
+def test_some_of_the_views_are_those_of_their_photos_alone(tmp_path):
+    """Photos of two lenses and one that does not say: each pair of them, and given poses."""
+    said = ({"exif": exif(focal_35mm=28)}, {}, {"exif": exif(focal_35mm=50)})
+    paths = [
+        saved(room_picture(400, 300, seed=seed), tmp_path / f"{seed}.jpg", **kept)
+        for seed, kept in enumerate(said)
+    ]
+    whole = load_views(paths)
+    for rows in ([0, 1], [0, 2], [2, 1], [1]):
+        some, alone = whole.some(rows), load_views([paths[row] for row in rows])
+        assert (some.images == alone.images).all() and (some.Ks == alone.Ks).all()
+        assert (some.names, some.sources, some.lenses) == (alone.names, alone.sources, alone.lenses)
+    assert whole.some([0, 2]).warnings == load_views([paths[0], paths[2]]).warnings
+    posed = replace(whole, viewmats=torch.eye(4).repeat(3, 1, 1))
+    poses = posed.some([0, 2]).viewmats
+    assert poses is not None and poses.shape == (2, 4, 4)
+    with pytest.raises(ValueError, match="expected 0 first"):
+        posed.some([1, 2])
+
+
 def test_files_of_one_name_are_told_apart(tmp_path):
     paths = []
     for folder, seed in (("left", 0), ("right", 1)):

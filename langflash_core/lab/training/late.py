@@ -12,7 +12,15 @@ from torch import Tensor, nn
 from torch.nn import functional as F
 
 from langflash_core.network.encoders.late import LateHalf, take_own
-from langflash_core.network.encoders.plain import NORM_EPS, Block, LayerScale, PlainViT, attend, through
+from langflash_core.network.encoders.plain import (
+    NORM_EPS,
+    Block,
+    LayerScale,
+    PlainViT,
+    attend,
+    patch_tokens,
+    through,
+)
 from langflash_core.network.guided import GuidedDepthNet
 from langflash_core.network.presets import GuidedDepth
 
@@ -65,7 +73,7 @@ class WholeLateHalf(nn.Module):
 
     def forward(self, early: Tensor, vit: PlainViT) -> tuple[Tensor, ...]:
         """As `LateHalf`; of `vit` nothing is read."""
-        return tuple(self.norm(x)[:, 1:] for x in through(self.blocks, early, self.hooks))
+        return tuple(patch_tokens(self.norm(x)) for x in through(self.blocks, early, self.hooks))
 
 
 def make_whole(network: GuidedDepthNet) -> None:

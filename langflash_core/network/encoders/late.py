@@ -13,7 +13,7 @@ from jaxtyping import Float
 from torch import Tensor, nn
 from torch.nn import functional as F
 
-from langflash_core.network.encoders.plain import NORM_EPS, Block, LayerScale, PlainViT, attend
+from langflash_core.network.encoders.plain import NORM_EPS, Block, LayerScale, PlainViT, attend, patch_tokens
 from langflash_core.network.encoders.shared import Tokens
 from langflash_core.network.presets import GuidedDepth
 
@@ -70,7 +70,7 @@ class LateHalf(nn.Module):
         for depth, (own, block) in enumerate(self.pairs(vit)):
             x = own(x, block)
             if depth in self.hooks:
-                given.append(self.norm(x)[:, 1:])
+                given.append(patch_tokens(self.norm(x)))
         return tuple(given)
 
 

@@ -8,7 +8,7 @@ from jaxtyping import Float
 from torch import Tensor, nn
 
 from langflash_core.base.many import together
-from langflash_core.network.encoders.plain import PlainViT
+from langflash_core.network.encoders.plain import PlainViT, patch_tokens
 from langflash_core.network.presets import GuidedDepth
 
 _MEAN = (0.485, 0.456, 0.406)
@@ -104,7 +104,7 @@ class Encoder(nn.Module):
         mean, std = (images.new_tensor(values)[:, None, None] for values in (_MEAN, _STD))
         flat = (images.flatten(0, 1) - mean) / std
         states = self.vit.states(flat, self.hook_blocks)
-        hooks = tuple(unflatten_views(self.vit.norm(x)[:, 1:], images) for x in states)
+        hooks = tuple(unflatten_views(patch_tokens(self.vit.norm(x)), images) for x in states)
         grid = (images.shape[-2] // self.patch, images.shape[-1] // self.patch)
         return Tokens(hooks, grid), states[1]
 
