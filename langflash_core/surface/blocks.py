@@ -23,17 +23,20 @@ LEVELS = 4
 LARGEST = 2**LEVELS
 """Pixels, side of the largest squares."""
 _COSTS = (3, 4, *[3] * (LEVELS - 2))
-"""Leaves that a parting adds, by level from the finest: one more goes beneath a square of 4 x 4 pixels."""
+"""Leaves that a parting adds, by level from the finest: one more goes beneath a square of 4 x 4 pixels, and
+another where it is torn."""
 
 
 @dataclass(frozen=True)
 class Tree:
     """gains: of parting each square of level l, at place l - 1, (rows, columns), and of its largest child
     where that is larger; endless where it must be parted, 0 where nobody needs it. wanted: (rows, columns)
-    bool of level l at place l: somebody needs the square."""
+    bool of level l at place l: somebody needs the square. torn: squares of 4 x 4 pixels that show two
+    surfaces, each of which goes on beneath (`elements.ground`)."""
 
     gains: tuple[Float[Tensor, "_ _"], ...]
     wanted: tuple[Bool[Tensor, "_ _"], ...]
+    torn: Bool[Tensor, "_ _"]
     size: tuple[int, int]
 
 
@@ -92,7 +95,8 @@ def grow_tree(
             gain = torch.zeros_like(gain)
         gains.append(torch.where(needed > 0, gain, 0.0))
         wanteds.append(needed > 0)
-    return Tree(tuple(gains), tuple(wanteds), size)
+    span = F.max_pool2d(depths[None], 4)[0] + F.max_pool2d(-depths[None], 4)[0]
+    return Tree(tuple(gains), tuple(wanteds), span > UPSAMPLING.jump, size)
 
 
 def threshold(trees: list[Tree], budget: int, least: float) -> float:
@@ -101,14 +105,20 @@ def threshold(trees: list[Tree], budget: int, least: float) -> float:
     is parted."""
     left = budget - sum(int(tree.wanted[-1].sum()) for tree in trees)
     gains = torch.cat([gain.flatten() for tree in trees for gain in tree.gains])
-    levels = zip(_COSTS * len(trees), [gain for tree in trees for gain in tree.gains], strict=True)
-    costs = torch.cat([torch.full((gain.numel(),), cost) for cost, gain in levels])
+    costs = torch.cat([torch.cat(_costs(tree)) for tree in trees])
     costs, gains = costs[gains > least], gains[gains > least]
     if int(costs.sum()) <= left:
         return least
     order = gains.argsort(descending=True)
     fitting = int((costs[order].cumsum(0) <= left).sum())
     return float(gains[order[fitting]])
+
+
+def _costs(tree: Tree) -> list[Int[Tensor, " _"]]:
+    """Leaves that parting each square adds, in the order of `gains`."""
+    costs = [torch.full((gain.numel(),), cost) for cost, gain in zip(_COSTS, tree.gains, strict=True)]
+    costs[1] += tree.torn.flatten()
+    return costs
 
 
 def leaves(tree: Tree, limit: float) -> tuple[list[Squares], Squares]:

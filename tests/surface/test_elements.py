@@ -12,7 +12,7 @@ from langflash_core.geometry.harmonics import sh_to_colour
 from langflash_core.geometry.quaternions import quats_to_matrices
 from langflash_core.splat.projection import DILATION, project
 from langflash_core.splat.reference import rasterize
-from langflash_core.surface.blocks import Squares
+from langflash_core.surface.blocks import Squares, grow_tree
 from langflash_core.surface.elements import (
     COARSE,
     FINE,
@@ -250,6 +250,19 @@ def two_surfaces(near: Tensor) -> tuple[Tensor, Upsampled]:
     photo = torch.stack((near.float(), torch.zeros(4, 4), (~near).float()))
     logs = torch.where(near, 0.1, 1.0)
     return photo, Upsampled(logs, torch.arange(16).view(4, 4), torch.zeros(4, 4))
+
+
+@pytest.mark.parametrize("size", [(64, 80), (59, 70)])
+def test_the_tree_knows_which_squares_have_two_grounds(size):
+    """Depths that jump within some squares; at sizes that end within one, too."""
+    generator = torch.Generator().manual_seed(0)
+    logs = torch.nn.functional.interpolate(torch.rand(1, 1, 9, 11, generator=generator) / 9, size=size)[0, 0]
+    photo, cells = torch.rand(3, *size, generator=generator), torch.zeros(size, dtype=torch.long)
+    tree = grow_tree(photo, logs, torch.full(size, torch.inf), torch.ones(size, dtype=torch.bool))
+    every = squares(4, size)
+    made = ground(every, photo, Upsampled(logs, cells, torch.zeros(size)))
+    torn = int(tree.torn[every.top // 4, every.left // 4].sum())
+    assert 0 < torn < len(every) and len(made) == len(every) + torn
 
 
 def test_a_square_of_two_surfaces_has_a_ground_of_each():
