@@ -21,6 +21,7 @@ FULL_AFTER = 0.70
 LARGE_SCENE = 200_000  # Gaussians, from which drawing fewer of them pays
 MIDDLING_SCENE = 30_000  # the same where OpenGL runs on the processor
 HUGE_SCENE = 3_000_000  # the same, from which bringing all of them there would stop the window for seconds
+MANY_ROWS = 1_000_000  # Gaussians, of which taking the coarse ones takes a frame's time
 MANY_COARSE = 60_000  # coarse Gaussians, from which drawing fewer of these pays there
 _RUNG_FACTOR = 1.8  # about what a rung saves
 
@@ -118,6 +119,11 @@ class Governor:
     def huge(self) -> bool:
         """Whether all that moves is a share made elsewhere."""
         return self.slow and self.coarse == 1 and self.num_gaussians >= HUGE_SCENE
+
+    @property
+    def waits(self) -> bool:
+        """Whether the share that moves is made beside the frames before there is a picture."""
+        return self.huge or (self.share < 1 and self.num_gaussians >= MANY_ROWS)
 
     @property
     def share(self) -> float:

@@ -57,7 +57,7 @@ class Viewport:
         self._stand = Stand()
         self._adjusting = False  # what is drawn changes with every frame
         self._fresh = False  # a scene has just been taken
-        self._awaited: tuple[int, Scene, float] | None = None  # a huge scene, and the share that is to come
+        self._awaited: tuple[int, Scene, float] | None = None  # a large scene, and the share that is to come
         self._asked: tuple[tuple[int, ...], CompiledQuery | None, int] | None = None  # of it, meanwhile
 
     def _made(self) -> "SplatRenderer":
@@ -99,8 +99,8 @@ class Viewport:
 
     def set_scene(self, serial: int, scene: "Scene", changed: bool = False) -> None:
         """Upload a scene; the first one builds the renderer. What pictures of another took is given back.
-        A huge one, where OpenGL runs on the processor, waits for `thin`. changed: it is the one on show as an
-        edit left it, whose last picture stays until there is a new one.
+        A large one, where OpenGL runs on the processor, waits for `thin`. changed: it is the one on show as
+        an edit left it, whose last picture stays until there is a new one.
 
         Raises:
             GraphicsError: the OpenGL here cannot do it.
@@ -115,14 +115,17 @@ class Viewport:
             from .drawing.processor import ProcessorPicture, governor_of
 
             governor = governor_of(scene)
-            if governor.huge:
+            if governor.waits:
                 self._awaited = serial, scene, governor.share
                 return
-            self.picture = ProcessorPicture(renderer, serial, scene, self._notify)
+            self._begin(ProcessorPicture(renderer, serial, scene, self._notify), scene)
         else:
             from .drawing.card import CardPicture
 
-            self.picture = CardPicture(renderer, serial, scene)
+            self._begin(CardPicture(renderer, serial, scene), scene)
+
+    def _begin(self, picture: ScenePicture, scene: "Scene") -> None:
+        self.picture, renderer = picture, self._made()
         if scene.layered:
             from ..gl.warming import warm_layers
 
@@ -144,15 +147,15 @@ class Viewport:
             self._before.release()
         self._before = None
 
-    def _begin(self, serial: int, scene: "Scene", thinned: "Scene", rows: np.ndarray) -> None:
-        """Show a huge scene, now that the share of it that moves is made."""
+    def _begin_thinned(self, serial: int, scene: "Scene", thinned: "Scene", rows: np.ndarray) -> None:
+        """Show a large scene, now that the share of it that moves is made."""
         from .drawing.processor import ProcessorPicture
 
         self._awaited = None
-        self.picture = ProcessorPicture(self._made(), serial, scene, self._notify, (thinned, rows))
-        self._fresh = True
+        picture = ProcessorPicture(self._made(), serial, scene, self._notify, (thinned, rows))
+        self._begin(picture, scene)
         if self._asked is not None:
-            self.picture.ask(*self._asked)
+            picture.ask(*self._asked)
 
     def ask(self, keys: tuple[int, ...], query: "CompiledQuery | None", revision: int = 0) -> None:
         """Ask the prompts `keys`, in the order of `query`, compiled when `Asking.revision` was `revision`;
@@ -195,7 +198,7 @@ class Viewport:
         """
         awaited = self._awaited
         if awaited is not None and awaited[1] is scene and awaited[2] == share:
-            self._begin(awaited[0], scene, thinned, rows)
+            self._begin_thinned(awaited[0], scene, thinned, rows)
         elif self.picture is not None:
             self.picture.easel.renderer.give_level(scene, share, thinned, rows)
             self.picture.governor = self.picture.governor.with_share(share)

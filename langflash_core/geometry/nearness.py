@@ -38,11 +38,13 @@ class Nearness:
 
     @staticmethod
     def of(scene: "Scene") -> "Nearness":
-        from langflash_core.geometry.cameras import invert_rigid, median_distance  # loads torch
+        import torch
+
+        from langflash_core.geometry.cameras import invert_rigid, median_distance
 
         assert scene.view_ids is not None
         poses = scene.viewmats.detach().cpu().double()
-        there = [int(view) for view in scene.view_ids.unique() if view >= 0]
+        there = torch.bincount(scene.view_ids[scene.view_ids >= 0]).nonzero()[:, 0].tolist()
         centres = invert_rigid(poses)[:, :3, 3].numpy()
         distance = median_distance(scene.gaussians.means, scene.viewmats[0])
         return Nearness(centres[there], poses[there, 2, :3].numpy(), distance, tuple(there))

@@ -30,7 +30,7 @@ from langflash_core.scene.edited import first_marks
 from langflash_core.scene.edits import History, delete
 from langflash_core.scene.exposure import lit_camera
 from langflash_core.scene.mask import Mask
-from langflash_core.scene.thin import thin_with_rows
+from langflash_core.scene.thin import coarse_share, thin_with_rows
 from langflash_core.types import Scene
 from tests.app.gl.test_gl_layers import layered
 from tests.app.window.scenes import PHRASES, VIEWS, after, room, shown_scene
@@ -374,6 +374,24 @@ def test_of_a_huge_scene_only_a_share_is_brought_to_opengl_on_the_processor(view
     assert live is not None and {*live._levels} == {share}
     moved = {plan.share for plan in plans[:20] if plan is not None}
     assert moved == {share} and plans[-1] is not None and plans[-1].share == 1
+
+
+def test_the_coarse_ones_of_a_large_scene_are_taken_beside_the_frames(viewport, monkeypatch) -> None:
+    """Of 2.6 million they stopped the window for a quarter of a second, when it was opened."""
+    monkeypatch.setattr("app.window.governor.MANY_ROWS", 10_000)
+    monkeypatch.setattr("app.window.governor.MIDDLING_SCENE", 10_000)
+    scene = spoken_room()
+    scene = replace(scene, levels=(torch.arange(len(scene.gaussians)) % 4).clamp(max=1).to(torch.uint8))
+    share = coarse_share(scene)
+    viewport.set_scene(1, scene)
+    if isinstance(viewport.picture, CardPicture):
+        pytest.skip("OpenGL here has a graphics card")
+    assert viewport.picture is None and viewport.shares == (share,)
+    viewport.thin(scene, share, *thin_with_rows(scene, share))
+    picture = viewport.picture
+    assert isinstance(picture, ProcessorPicture) and picture.governor.share == share
+    live = viewport._made()._scene
+    assert live is not None and {*live._levels} == {share}
 
 
 @pytest.mark.parametrize("picture", [ProcessorPicture, CardPicture])
