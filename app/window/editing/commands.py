@@ -117,6 +117,8 @@ def selected(state: State, after: Marks, combine: Combine, what: str) -> State:
     """The state after a selection became another. what: how, for the list of edits."""
     marks = state.editing.marks
     assert marks is not None
+    if not after.selected:
+        return with_edit(state, "Deselect", after)
     changed = len(after.selected ^ marks.selected)
     count = len(after.selected) if combine == "replace" else changed
     verb = {"replace": "Select", "add": "Add", "remove": "Unselect"}[combine]
