@@ -2,7 +2,7 @@
 
     python watched.py WIDTH HEIGHT RECORD [PATHS...]
 
-State goes to stdout as JSON lines, as from driver.py; on leaving, RECORD receives every step of the loop.
+What `driver.py` tells goes to stdout as JSON lines; on leaving, RECORD receives every step of the loop.
 The code under watch is the one that PYTHONPATH names, which may be another version of the program.
 """
 

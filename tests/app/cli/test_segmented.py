@@ -1,8 +1,10 @@
 """`langflash export --segmented`, and the single files of the same: definitions, manifest, the way back."""
 
+import io
 import json
 import shlex
 import sys
+from contextlib import redirect_stdout
 from pathlib import Path
 
 import numpy as np
@@ -10,6 +12,7 @@ import pytest
 import trimesh
 from PIL import Image
 
+from app.cli import main
 from tests.app.cli.conftest import HEIGHT, WIDTH, pixels, stripes
 
 TORCH = ("--backend", "torch")
@@ -20,11 +23,14 @@ def files_of(folder: Path) -> dict[str, bytes]:
     return {str(path.relative_to(folder)): path.read_bytes() for path in folder.rglob("*") if path.is_file()}
 
 
-@pytest.fixture
-def folder(run, scene_file, tmp_path) -> Path:
-    outcome = run("export", scene_file, "-o", tmp_path / "new" / "out", "--segmented", *ASKED, *TORCH)
-    assert outcome.code == 0 and "2 of 3 phrases, 2 instances in 2 views" in outcome.out, outcome
-    return tmp_path / "new" / "out"
+@pytest.fixture(scope="module")
+def folder(scene_file, tmp_path_factory) -> Path:
+    """Made once; tests only read it."""
+    out = tmp_path_factory.mktemp("segmented") / "new" / "out"
+    with redirect_stdout(io.StringIO()) as said:
+        code = main(["export", str(scene_file), "-o", str(out), "--segmented", *ASKED, *TORCH])
+    assert code == 0 and "2 of 3 phrases, 2 instances in 2 views" in said.getvalue()
+    return out
 
 
 @pytest.fixture

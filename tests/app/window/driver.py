@@ -1,14 +1,13 @@
-"""Runs the window for a test: steps it until it is closed and prints its state as JSON lines.
+"""Runs the window for a test: steps it until it is closed and sends its state as JSON.
 
-    python driver.py WIDTH HEIGHT [PATHS...]
-
-A line is printed when anything a test may wait for has changed, with the seconds that each frame
-since the last line took and by how much each came late. "items" tells where the things to click are.
-The last line has "closed".
+It is sent when anything a test may wait for has changed, with the seconds that each frame since the last
+time took and by how much each came late. "items" tells where the things to click are. What is sent last
+has "closed".
 """
 
 import json
-import sys
+import os
+from multiprocessing.connection import Connection
 
 from app.window.editing.state import Editing
 from app.window.session import Session
@@ -84,10 +83,11 @@ def summary(session: Session) -> dict:
     }
 
 
-def main() -> int:
-    width, height, *paths = sys.argv[1:]
+def main(sent: Connection, environment: dict[str, str], size: tuple[int, int], paths: list[str]) -> None:
+    os.environ.clear()
+    os.environ.update(environment)
     items = Items()
-    session = Session(paths, (int(width), int(height)))
+    session = Session(paths, size)
     last = None
     frames = 0
     seconds: list[float] = []
@@ -102,13 +102,7 @@ def main() -> int:
             if now != last:
                 last = now
                 line = {**now, "frames": frames, "seconds": seconds, "lags": lags}
-                sys.stdout.write(json.dumps(line) + "\n")
-                sys.stdout.flush()
+                sent.send(json.dumps(line))
                 seconds, lags = [], []
     finally:
         session.close()
-    return 0
-
-
-if __name__ == "__main__":
-    sys.exit(main())

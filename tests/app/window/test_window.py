@@ -4,6 +4,7 @@ Xvfb shows it, xdotool types and points, a second X client drops files and takes
 """
 
 import json
+import multiprocessing
 import os
 import shutil
 import signal
@@ -12,7 +13,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from pathlib import Path
 
 import numpy as np
@@ -23,6 +24,7 @@ from app.window.frame.layout import CANVAS_TOP
 from app.window.kit import theme
 from langflash_core.language.spaces import language_space
 from langflash_core.scene.file import save
+from tests.app.window import driver
 from tests.app.window.scenes import PHRASES, room
 from tests.app.window.x11 import Client
 
@@ -31,6 +33,10 @@ PATIENCE = 60.0  # seconds; an upper bound for a busy machine, never waited for 
 ROOT = Path(__file__).parents[3]
 LEFT, TOP = int(theme.PANEL_WIDTH), int(CANVAS_TOP)
 CANVAS = (slice(TOP, SIZE[1] - int(theme.STATUS_HEIGHT)), slice(LEFT, SIZE[0]))
+# Windows are processes of their own, forked from one that has imported what a window does and opened none:
+# imports are most of a start. `test_window_journey.py` starts the program as people do.
+WINDOWS = multiprocessing.get_context("forkserver")
+WINDOWS.set_forkserver_preload(["tests.app.window.driver", "torch", "app.gl"])
 MIDDLE = ((LEFT + SIZE[0]) // 2, (TOP + SIZE[1]) // 2)
 
 pytestmark = [
@@ -82,9 +88,11 @@ class Program:
     def __init__(self, display: str, *paths: Path, size: tuple[int, int] = SIZE) -> None:
         self._environment = {**os.environ, "DISPLAY": display, "PYTHONPATH": str(ROOT)}
         self._environment.pop("WAYLAND_DISPLAY", None)
-        driver = Path(__file__).with_name("driver.py")
-        command = [sys.executable, str(driver), *map(str, size), *map(str, paths)]
-        self._process = subprocess.Popen(command, env=self._environment, stdout=subprocess.PIPE, text=True)
+        self._sent, sending = WINDOWS.Pipe(duplex=False)
+        told = (sending, self._environment, size, [str(path) for path in paths])
+        self._process = WINDOWS.Process(target=driver.main, args=told)
+        self._process.start()
+        sending.close()
         self._lines: list[dict] = []
         self._changed = threading.Condition()
         self._reader = threading.Thread(target=self._read, daemon=True)
@@ -96,11 +104,12 @@ class Program:
         self.xdotool("windowmove", str(self.window), "0", "0", "windowfocus", "--sync", str(self.window))
 
     def _read(self) -> None:
-        assert self._process.stdout is not None
-        for line in self._process.stdout:
-            with self._changed:
-                self._lines.append(json.loads(line))
-                self._changed.notify_all()
+        with suppress(EOFError):
+            while True:
+                line = json.loads(self._sent.recv())
+                with self._changed:
+                    self._lines.append(line)
+                    self._changed.notify_all()
 
     @property
     def state(self) -> dict:
@@ -136,11 +145,11 @@ class Program:
     @contextmanager
     def stopped(self) -> Iterator[None]:
         """The program meanwhile reads nothing; what hands do comes to it all at once."""
-        self._process.send_signal(signal.SIGSTOP)
+        os.kill(self.pid, signal.SIGSTOP)
         try:
             yield
         finally:
-            self._process.send_signal(signal.SIGCONT)
+            os.kill(self.pid, signal.SIGCONT)
 
     def picture(self) -> np.ndarray:
         """The canvas (h, w, 3) as shown, float in [0, 255]."""
@@ -203,14 +212,22 @@ class Program:
         """Where the first prompt's field is."""
         return self.item("##text")
 
-    def leave(self) -> int:
+    @property
+    def pid(self) -> int:
+        assert self._process.pid is not None
+        return self._process.pid
+
+    def ended(self) -> int | None:
+        """Its exit code, once it has come to its end; None where it does not."""
+        self._process.join(PATIENCE)
+        return self._process.exitcode
+
+    def leave(self) -> None:
         self.client.close()
-        if self._process.poll() is None:
-            self._process.terminate()
+        self._process.terminate()
         self._reader.join(PATIENCE)
-        if self._process.stdout is not None:
-            self._process.stdout.close()
-        return self._process.wait(PATIENCE)
+        self._sent.close()
+        assert self.ended() is not None
 
 
 @pytest.fixture(scope="module")
@@ -327,7 +344,7 @@ def test_keys_change_the_mode(program: Program) -> None:
 def test_an_idle_window_draws_nothing(program: Program) -> None:
     program.xdotool("mousemove", *map(str, MIDDLE))
     program.at_rest()
-    process = Path(f"/proc/{program._process.pid}/stat")
+    process = Path(f"/proc/{program.pid}/stat")
 
     def ticks() -> int:
         return sum(map(int, process.read_text().rpartition(")")[2].split()[11:13]))
@@ -371,13 +388,13 @@ def test_drops_a_real_drop_and_escape(program: Program, scene_file: Path, tmp_pa
     program.xdotool("key", "ctrl+q")
     state = program.until(lambda s: s["closed"], "the end")
     assert state["gl_errors"] == []
-    assert program._process.wait(PATIENCE) == 0
+    assert program.ended() == 0
 
 
 def test_the_close_button_ends_with_0(display: str) -> None:
     empty = Program(display)
     empty.client.ask_to_close(empty.window)
-    assert empty._process.wait(PATIENCE) == 0
+    assert empty.ended() == 0
     empty.leave()
 
 

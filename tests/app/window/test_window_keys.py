@@ -32,11 +32,11 @@ __all__ = ["display", "program", "pytestmark", "scene_file"]  # fixtures and the
 @contextmanager
 def held(program: Program) -> Iterator[None]:
     """While the window does nothing."""
-    os.kill(program._process.pid, signal.SIGSTOP)
+    os.kill(program.pid, signal.SIGSTOP)
     try:
         yield
     finally:
-        os.kill(program._process.pid, signal.SIGCONT)
+        os.kill(program.pid, signal.SIGCONT)
 
 
 def test_ctrl_a_in_a_field_that_was_just_clicked_is_the_fields(program: Program) -> None:

@@ -220,7 +220,7 @@ def test_a_crash_loses_no_edit(display: str, scene_file: Path, state_folder: Pat
     while not list(state_folder.glob("*.edits")) and end > 0:
         running.at_rest()
         end -= 1
-    os.kill(running._process.pid, signal.SIGKILL)
+    os.kill(running.pid, signal.SIGKILL)
     running.leave()
     again = Program(display, scene_file)
     again.until(lambda s: s["offer"] == 2, "the offer")

@@ -82,7 +82,7 @@ def test_a_thing_is_moved_by_the_gizmo_recoloured_and_outlives_a_crash(
     while not any(b"Recolour" in file.read_bytes() for file in state_folder.glob("*.edits")) and left > 0:
         program.at_rest()
         left -= 1
-    os.kill(program._process.pid, signal.SIGKILL)
+    os.kill(program.pid, signal.SIGKILL)
     again = Program(display, scene_file)
     again.until(lambda s: s["offer"] == 4, "the offer")
     again.at_rest()

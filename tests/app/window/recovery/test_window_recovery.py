@@ -44,7 +44,7 @@ def test_a_killed_session_comes_back_whole(display: str, scene_file: Path, folde
     edits = Path(kept(state)["edits"])
     wait_for_files(lambda: len(json.loads(edits.read_bytes())["done"]) == 2, "both edits")
     wait_for_files(lambda: kept(state)["pose"]["centre"] == before["pose"][:3], "the camera")
-    os.kill(running._process.pid, signal.SIGKILL)
+    os.kill(running.pid, signal.SIGKILL)
     running.leave()
 
     again = Program(display)
@@ -63,6 +63,6 @@ def test_a_killed_session_comes_back_whole(display: str, scene_file: Path, folde
     again.at_rest()
     assert np.ptp(again.picture()) > 50  # the room is there again
     again.client.ask_to_close(again.window)
-    assert again._process.wait(PATIENCE) == 0
+    assert again.ended() == 0
     again.leave()
     assert list(state.iterdir()) == []
