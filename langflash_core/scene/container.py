@@ -92,7 +92,7 @@ def check_container(path: Path) -> None:
     Raises:
         SceneFileError: as `read_container`, but for what only the checksum shows.
     """
-    _version(path, _read_file(path)[0])
+    _version(path, _read_file(path, whole=False)[0])
 
 
 def damage_error(path: Path, reason: object) -> SceneFileError:
@@ -111,8 +111,8 @@ def digest(text: str, arrays: Mapping[str, Shaped[np.ndarray, "..."]]) -> str:
     return total.hexdigest()
 
 
-def _read_file(path: Path) -> tuple[dict[str, str], bytes]:
-    """The `__metadata__` strings and the whole file, after its size was found right."""
+def _read_file(path: Path, whole: bool = True) -> tuple[dict[str, str], bytes]:
+    """The `__metadata__` strings and the whole file, or its header, after its size was found right."""
     if path.is_dir():
         raise SceneFileError(f"{path} is a folder; name a scene file (.langflash)")
     try:
@@ -126,7 +126,7 @@ def _read_file(path: Path) -> tuple[dict[str, str], bytes]:
             header = _parse_header(path, start + head[:8], head)
             _check_counts(path, header)
             _check_size(path, 8 + length, header, size)
-            return header["__metadata__"], start + head + stream.read()
+            return header["__metadata__"], start + head + (stream.read() if whole else b"")
     except FileNotFoundError as error:
         remedy = "check the path, or make it with: langflash reconstruct"
         raise SceneFileError(f"scene {path} does not exist; {remedy}") from error

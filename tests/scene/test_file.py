@@ -39,6 +39,12 @@ def path(scene, tmp_path):
     return tmp_path / "a.langflash"
 
 
+def test_a_check_reads_the_header_alone(path):
+    whole, head = container._read_file(path)[1], container._read_file(path, whole=False)[1]
+    assert whole == path.read_bytes() and whole.startswith(head) and len(head) < len(whole)
+    container.check_container(path)
+
+
 def test_a_scene_that_is_saved_over_while_it_is_read_is_read_as_it_was(scene, path, monkeypatch):
     """By another program; the sizes of two files are not to be compared."""
     parsed, known = container._parse_header, path.read_bytes()
