@@ -9,7 +9,6 @@ from dataclasses import dataclass
 import cv2
 import numpy as np
 from jaxtyping import Bool, Float, Int
-from scipy.optimize import least_squares
 from scipy.sparse import lil_matrix
 from scipy.spatial.transform import Rotation
 
@@ -86,6 +85,8 @@ def adjust_camera(
     Args:
         viewmat: nearly right, world to camera.
     """
+    from scipy.optimize import least_squares  # .05 s, which a scene has not to wait for
+
     rays = np.column_stack((from_pixels(sightings.pixels, K), np.ones(len(sightings.pixels))))
     known = np.log(sightings.depths)
     of, count, many = sightings.of, len(sightings.seen), len(known)
