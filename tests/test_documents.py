@@ -28,7 +28,7 @@ WORDS = {
 }
 """What a page may grow to before something has to leave it. There is room, so that nobody shortens sentences
 to stay within it; all pages at the top together have a limit of their own."""
-ALL_WORDS = 25_000
+ALL_WORDS = 24_500
 """What somebody who joins can read in two hours."""
 LINE = 120
 """Letters of a line of prose: what an editor shows beside another."""

@@ -14,7 +14,7 @@ from langflash_core.network import MINI, GuidedDepthNet, initial_network, load_n
 from langflash_core.network.build import build_network
 from langflash_core.network.checkpoints.files import read_weights, start_from
 from langflash_core.network.encoders.late import LateHalf
-from langflash_core.network.encoders.plain import PlainViT
+from langflash_core.network.encoders.plain import PlainViT, patch_tokens
 
 
 @pytest.fixture(scope="module")
@@ -55,7 +55,7 @@ def test_it_begins_as_the_encoder(vit, states):
     late.begin(vit)
     with torch.inference_mode():
         found = late(states[1], vit)
-        expected = [vit.norm(x)[:, 1:] for x in states[2:]]
+        expected = [patch_tokens(vit.norm(x)) for x in states[2:]]
     assert len(found) == len(expected) == 2
     assert all(torch.equal(*pair) for pair in zip(found, expected, strict=True))
 
@@ -142,7 +142,7 @@ def told(network) -> tuple[torch.Tensor, torch.Tensor]:
 def test_a_network_gives_all_halves(network):
     with torch.inference_mode():
         tokens = network.encode(IMAGES, KS)
-    assert [tuple(hook.shape) for hook in (*tokens.named, *tokens.deep)] == [(1, 2, 6, 384)] * 3
+    assert [tuple(hook.shape) for hook in (*tokens.named, *tokens.deep)] == [(1, 2, 6, MINI.encoder_dim)] * 3
     for own, hook in zip((*tokens.named, *tokens.deep), (*tokens.hooks[2:], tokens.hooks[3]), strict=True):
         assert torch.equal(own, hook)
     assert [hook.shape[1] for hook in (*tokens.views([1]).named, *tokens.views([1]).deep)] == [1, 1, 1]
@@ -178,3 +178,9 @@ def test_files_from_before_depth_had_a_half_tell_the_same_depth(network, tmp_pat
         before = found.monocular_depth(replace(tokens, deep=tokens.named[1:]), KS)
         assert torch.equal(found.monocular_depth(tokens, KS).log_depths, before.log_depths)
     assert found.deep.norm.weight.data_ptr() != found.late.norm.weight.data_ptr(), "each learns alone"
+
+
+def test_a_side_that_is_no_multiple_of_the_patch_is_refused():
+    network = build_network(MINI)
+    with pytest.raises(ValueError, match="multiples of 14, received \\(28, 43\\)"):
+        network.encoder(torch.zeros(1, 1, 3, 28, 43))

@@ -48,6 +48,7 @@ from langflash_core.base.graphics import offscreen_context
 from langflash_core.geometry import poses
 from langflash_core.geometry.harmonics import colour_to_sh
 from langflash_core.geometry.poses import Pose
+from langflash_core.scene.thin import thin_with_rows
 from langflash_core.types import Scene
 from tests.app.window.headless import context
 from tests.boxroom import box_room, in_layers
@@ -99,6 +100,8 @@ class Window:
         drawn = SceneEffects(hands, self.viewport, Thumbnails(ctx), lambda title: None)
         self._effects = (drawn, EditingEffects(hands, self.viewport))
         self.perform(SceneArrived(describe_scene(scene, 1, "walk")))
+        for share in self.viewport.shares:  # the window's worker does so
+            self.viewport.thin(scene, share, *thin_with_rows(scene, share))
 
     def perform(self, command: Command) -> None:
         before, self.state = self.state, apply(self.state, command)

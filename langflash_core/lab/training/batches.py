@@ -14,8 +14,7 @@ from torch import Tensor
 from langflash_core.geometry.cameras import invert_rigid
 from langflash_core.lab.training.shards import Label, RoomRecord, Shard, dequantise_tokens, open_shards
 from langflash_core.network.encoders.shared import Tokens
-
-PATCH = 14
+from langflash_core.network.presets import MINI
 
 
 @dataclass(frozen=True)
@@ -108,7 +107,7 @@ def _tokens(records: Sequence[RoomRecord]) -> Tokens | None:
     steps = torch.stack([r.tokens for r in records if r.tokens is not None])
     scales = torch.stack([r.token_scales for r in records if r.token_scales is not None])
     hooks = dequantise_tokens(steps, scales).unbind(2)  # (B, V, T, C) each
-    return Tokens(hooks, (height // PATCH, width // PATCH))
+    return Tokens(hooks, (height // MINI.patch, width // MINI.patch))
 
 
 class RoomSet:

@@ -14,7 +14,7 @@ from langflash_core.network.layers.draws import draw_normal
 from langflash_core.network.presets import GuidedDepth
 
 NORM_EPS = 1e-6
-PREFIX = 1  # tokens before those of patches: the class token; an encoder with R registers has 1 + R
+PREFIX = 1  # tokens before those of patches: the class token, and R more of an encoder with R registers
 _FIRST_SCALE = 1e-5  # of what a fresh block adds, as the paper of layer scale has it
 
 
@@ -33,7 +33,7 @@ class PlainViT(nn.Module):
         dim, heads = preset.encoder_dim, preset.encoder_heads
         self.trained_grid = preset.trained_grid
         self.cls_token = nn.Parameter(torch.zeros(1, 1, dim))
-        self.pos_embed = nn.Parameter(draw_normal(1, preset.trained_grid**2 + PREFIX, dim, std=0.02))
+        self.pos_embed = nn.Parameter(draw_normal(1, preset.trained_grid**2 + 1, dim, std=0.02))
         self.patch_embed = _Patches(dim, preset.patch)
         self.blocks = nn.ModuleList(Block(dim, heads) for _ in range(preset.encoder_depth))
         self.norm = nn.LayerNorm(dim, NORM_EPS)
@@ -53,9 +53,9 @@ class PlainViT(nn.Module):
         side = self.trained_grid
         if grid == (side, side):
             return self.pos_embed
-        learned = patch_tokens(self.pos_embed).unflatten(1, (side, side)).permute(0, 3, 1, 2)
+        learned = self.pos_embed[:, 1:].unflatten(1, (side, side)).permute(0, 3, 1, 2)
         resized = F.interpolate(learned, size=grid, mode="bicubic", antialias=True)
-        return torch.cat((self.pos_embed[:, :PREFIX], resized.permute(0, 2, 3, 1).flatten(1, 2)), 1)
+        return torch.cat((self.pos_embed[:, :1], resized.permute(0, 2, 3, 1).flatten(1, 2)), 1)
 
 
 def patch_tokens(x: Float[Tensor, "n T C"]) -> Float[Tensor, "n _ C"]:

@@ -100,7 +100,14 @@ class Encoder(nn.Module):
 
     @torch.no_grad()
     def forward(self, images: Float[Tensor, "B V 3 H W"]) -> tuple[Tokens, Float[Tensor, "n _ C"]]:
-        """Tokens of images (B, V, 3, H, W) in [0, 1], and what `LateHalf` reads, (B*V, 1 + h*w, C)."""
+        """Tokens of images (B, V, 3, H, W) in [0, 1], and what `LateHalf` reads, (B*V, 1 + h*w, C).
+
+        Raises:
+            ValueError: a side is no multiple of the patch.
+        """
+        if images.shape[-2] % self.patch or images.shape[-1] % self.patch:
+            sides = tuple(images.shape[-2:])
+            raise ValueError(f"images: expected sides that are multiples of {self.patch}, received {sides}")
         mean, std = (images.new_tensor(values)[:, None, None] for values in (_MEAN, _STD))
         flat = (images.flatten(0, 1) - mean) / std
         states = self.vit.states(flat, self.hook_blocks)
