@@ -90,7 +90,8 @@ def test_what_holds_arrays_prints_their_sizes(room):
 
 
 def test_an_inventory_is_three_lines(room):
-    assert len(repr(lf.inventory(room)).splitlines()) == 3
+    said = repr(lf.inventory(room)).splitlines()
+    assert len(said) == 3 and " × " in said[1], "no plural is needed, nor made wrong"
 
 
 # Masks

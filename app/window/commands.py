@@ -175,13 +175,14 @@ class EditPalette:
 
 @dataclass(frozen=True)
 class Leave:
-    """Close the window; asks first when a scene would be lost, unless `sure`. Saving then closes it too."""
+    """Close the window; asks first while a scene or its edits are not saved, unless `sure`. Saving then
+    closes it too."""
 
     sure: bool = False
 
     def apply(self, state: State) -> State:
-        unsaved = state.scene.info is not None and state.scene.info.path is None
-        if unsaved and not self.sure:
+        info = state.scene.info
+        if info is not None and (info.path is None or state.editing.unsaved) and not self.sure:
             return replace(state.with_scene(pending=(Leave(sure=True),)), dialog=Dialog.LEAVE)
         return replace(state, leaving=True, dialog=None)
 

@@ -21,7 +21,7 @@ FORMAT = 3
 INDEX = "strip.json"
 REPEAT, ELSEWHERE = "repeat", "elsewhere"
 REASONS = {
-    "between": "lay between them",
+    "between": "lay between the chosen ones",
     "blurred": "were blurred",
     "repeats": "showed what others show",
     "dark": "were dark",

@@ -159,4 +159,4 @@ def _decode_photo(source: bytes) -> Tensor:
 def _assumption(assumed: list[str], total: int) -> str:
     whose = "the photos do not record their lens" if len(assumed) == total > 1 else ""
     whose = whose or f"{' and '.join(assumed)} {'does' if len(assumed) == 1 else 'do'} not record the lens"
-    return f"{whose}, a field of view of {LENS_PRIOR.assumed_fov:g}° is assumed; set it with --fov"
+    return f"{whose}, so a field of view of {LENS_PRIOR.assumed_fov:g}° is assumed; set it with --fov"

@@ -104,7 +104,7 @@ class Inventory:
 
     def __repr__(self) -> str:
         """Three lines: how many things, of which kinds, in which unit."""
-        kinds = ", ".join(f"{count} {kind}" for kind, count in self.counts.items())
+        kinds = ", ".join(f"{count} × {kind}" for kind, count in self.counts.items())
         return (
             f"Inventory: {len(self.things)} things (inventory.things)\n"
             f"  {kinds or '-'}\n"

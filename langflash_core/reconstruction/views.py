@@ -12,7 +12,7 @@ from langflash_core.images.straight import after, straighten_views
 from langflash_core.types import Prediction, Views
 
 _STRAIGHTENED = 3  # times, at most
-_NOT_TOLD = "; these photos do not determine it by themselves"
+_NOT_TOLD = "; the photos alone do not tell"
 
 
 def posed_views(views: Views, viewmats: Float[Tensor, "V 4 4"] | None, preset: str) -> Views:

@@ -132,7 +132,7 @@ def unplaced_names(left_out: Mapping[str, Any]) -> tuple[str, ...]:
 
 
 def film_sentences(left_out: Mapping[str, Any]) -> list[str]:
-    """What became of the frames of each film: "Of 480 frames of walk.mp4 12 were blurred."; nothing of what
+    """What became of the frames of each film: "Of 480 frames of walk.mp4, 12 were blurred."; nothing of what
     cannot be read."""
     stored = left_out.get("films")
     said = []
@@ -142,7 +142,7 @@ def film_sentences(left_out: Mapping[str, Any]) -> list[str]:
         counts = why.items() if isinstance(why, Mapping) else ()
         parts = [f"{n} {phrase}" for phrase, count in counts if (n := _count(count)) and count]
         if isinstance(film, str) and _count(frames) and parts:
-            said.append(f"Of {_count(frames)} frames of {film} {', '.join(parts)}.")
+            said.append(f"Of {_count(frames)} frames of {film}, {', '.join(parts)}.")
     return said
 
 

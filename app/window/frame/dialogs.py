@@ -277,7 +277,9 @@ def _help_group(group: str | None, look: Look, room: float) -> None:
 
 
 def _leave(state: State, look: Look) -> list[do.Command]:
-    imgui.text_wrapped("The scene is not saved.")
+    info = state.scene.info
+    lost = "The scene is" if info is None or info.path is None else f"The edits of {info.name} are"
+    imgui.text_wrapped(f"{lost} not saved.")
     issued: list[do.Command] = []
     if widgets.default_button("Save and quit", look.vec(140, 0)):
         issued.append(show.SaveFirst())

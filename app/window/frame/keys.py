@@ -93,8 +93,8 @@ def _escape(state: State) -> list[do.Command]:
     editing = state.editing
     if state.dialog:
         return [opening.PlaceFound(None) if state.dialog is Dialog.PLACE else do.ShowDialog(None)]
-    if imgui.is_popup_open("", imgui.PopupFlags_.any_popup):
-        imgui.internal.close_popups_except_modals()
+    windows = imgui.get_current_context().windows  # ImGui has shut the menu before this frame was drawn
+    if any(window.was_active and window.flags & imgui.WindowFlags_.popup for window in windows):
         return []
     if state.filming.tour is not None:
         return [film.StopTour()]

@@ -83,7 +83,7 @@ def _body(state: State, look: Look, picture: tuple[float, float, float]) -> list
     if listing.problem:
         widgets.muted(widgets.sentence(listing.problem))
         return []
-    counts = ", ".join(f"{number} {kind}" for kind, number in listing.counts.items())
+    counts = ", ".join(f"{number} × {kind}" for kind, number in listing.counts.items())
     total = f"{len(listing.rows)} thing{'s' * (len(listing.rows) != 1)}"
     imgui.text(total + ("  ..." if listing.looking else ""))
     imgui.same_line()
@@ -200,7 +200,7 @@ def words(row: Row, unit: str) -> tuple[str, str]:
     sides = "E" if east >= 0 else "W", "N" if north >= 0 else "S"
     short = unit if unit == "m" else "u"
     where = f"{abs(east):.1f} {short} {sides[0]}, {abs(north):.1f} {short} {sides[1]}"
-    seen = f"photo{'s' * (len(row.photos) > 1)} {', '.join(str(view + 1) for view in row.photos)}"
+    seen = f"photo{'s' * (len(row.photos) > 1)} {', '.join(str(view + 1) for view in sorted(row.photos))}"
     return size, f"{where} · {seen}" if row.photos else where
 
 

@@ -53,7 +53,7 @@ def test_the_folder_is_replaced_and_nothing_else_is(run, walk: Path, tmp_path: P
     assert run("frames", walk, "-o", out).code == 0
     first = sorted(out.iterdir())
     again = run("frames", walk, "-o", out, "--most", 3)
-    assert again.code == 0 and "3 of 40 frames; 37 lay between them" in again.out
+    assert again.code == 0 and "3 of 40 frames; 37 lay between the chosen ones" in again.out
     assert sum(map(is_still, os.listdir(out))) == 3 < len(first) - 1
     (out / "diary.txt").write_text("mine")
     refused = run("frames", walk, "-o", out)

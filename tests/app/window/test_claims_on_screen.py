@@ -63,10 +63,10 @@ def test_a_warning_that_every_photo_and_the_scene_repeat_is_said_once() -> None:
     assert tray._sentences(state) == ["It is dark."]
 
 
-def drawn_over(state: State) -> int:
-    """Vertices of what is marked in the picture."""
+def drawn_over(state: State) -> list[float]:
+    """How far to the right each vertex of what is marked in the picture stands."""
     with context((1280, 800)):
-        found = []
+        found: list[list[float]] = []
 
         def panel(seen: Look) -> None:
             imgui.set_next_window_pos(ImVec2(LEFT, TOP))
@@ -74,7 +74,8 @@ def drawn_over(state: State) -> int:
             imgui.begin("##picture")
             before = imgui.get_window_draw_list().vtx_buffer.size()
             in_space.draw(state, seen, *place((1280, 800)))
-            found.append(imgui.get_window_draw_list().vtx_buffer.size() - before)
+            buffer = imgui.get_window_draw_list().vtx_buffer
+            found.append([buffer[each].pos.x for each in range(before, buffer.size())])
             imgui.end()
 
         frames(panel, look())
@@ -84,9 +85,18 @@ def drawn_over(state: State) -> int:
 def test_the_best_candidate_of_a_maybe_is_marked_and_that_of_nothing_is_not() -> None:
     shown = replace(shown_scene(), preferences=replace(State().preferences, photos_in_space=False))
     row = Prompt(9, "curtain", score=0.82, calibrated=0.83, place=Vector(0.0, 0.0, 1.0))
-    assert row.maybe and drawn_over(shown.with_asking(prompts=(row,))) > 0
+    assert row.maybe and drawn_over(shown.with_asking(prompts=(row,)))
     missed = replace(row, score=0.3)
-    assert not missed.maybe and drawn_over(shown.with_asking(prompts=(missed,))) == 0
+    assert not missed.maybe and drawn_over(shown.with_asking(prompts=(missed,))) == []
+
+
+@pytest.mark.parametrize("x", np.linspace(0.3, 0.9, 7))
+def test_the_name_of_a_candidate_ends_in_the_picture(x: float) -> None:
+    """To the right of its ring it was cut off by the window's edge."""
+    shown = replace(shown_scene(), preferences=replace(State().preferences, photos_in_space=False))
+    row = Prompt(9, "kitchen island", score=0.82, calibrated=0.83, place=Vector(x, 0.0, 1.0))
+    drawn = drawn_over(shown.with_asking(prompts=(row,)))
+    assert max(drawn, default=0.0) <= 1280 + 28, "the ring, 26 pixels and its line, may reach over"
 
 
 def test_the_kind_of_rays_is_a_button_beside_the_axes() -> None:

@@ -8,6 +8,7 @@ import pytest
 from app.window import commands as do
 from app.window.asking import commands as ask
 from app.window.dialogs import Dialog
+from app.window.editing import commands as edit
 from app.window.frame.status import figures, fitting
 from app.window.kit.widgets import sentence
 from app.window.scene import camera
@@ -15,6 +16,7 @@ from app.window.scene import commands as show
 from app.window.state import TOAST_SECONDS, State
 from langflash_core.base import pictures
 from tests.app.window.scenes import after, shown_scene
+from tests.app.window.test_small_windows import edited
 
 
 def test_a_command_leaves_the_old_state_alone() -> None:
@@ -36,6 +38,18 @@ def test_leaving_asks_while_a_scene_is_unsaved(shown: State) -> None:
     assert not asked.leaving and asked.dialog is Dialog.LEAVE
     assert after(asked, do.Leave(sure=True)).leaving
     assert after(shown, show.SceneSaved(Path("s.langflash")), do.Leave()).leaving
+
+
+def test_leaving_asks_while_edits_of_a_saved_scene_are_unsaved() -> None:
+    """It closed at once; the edits were kept beside, but nobody was told so."""
+    opened = edited()
+    assert opened.scene.info is not None
+    opened = opened.with_scene(info=replace(opened.scene.info, path=Path("s.langflash")))
+    saved = after(opened, show.SceneSaved(Path("s.langflash"), opened.editing.marks))
+    assert after(saved, do.Leave()).leaving
+    asked = after(saved, edit.Delete(), do.Leave())
+    assert not asked.leaving and asked.dialog is Dialog.LEAVE
+    assert asked.scene.pending == (do.Leave(sure=True),)
 
 
 def test_the_save_dialog_proposes_a_place(shown: State) -> None:

@@ -20,6 +20,7 @@ from app.window.opening.state import Film, Folder
 from app.window.scene import commands as show
 from app.window.scene import merging
 from app.window.scene.drops import There, Typed
+from app.window.scene.state import Job
 from app.window.state import State
 from langflash_core.images.strip import Still, Strip
 from tests.app.window.headless import context
@@ -103,6 +104,31 @@ def test_enter_presses_the_orange_button(dialog: Dialog, key: imgui.Key) -> None
 def test_escape_leaves_every_dialog(dialog: Dialog) -> None:
     left = opening.PlaceFound(None) if dialog is Dialog.PLACE else do.ShowDialog(None)
     assert left in pressed(opened(dialog), imgui.Key.escape)
+
+
+def test_escape_in_a_menu_shuts_the_menu_and_leaves_the_job_alone() -> None:
+    """ImGui shuts it before the keys are read, and a reconstruction of minutes was cancelled too."""
+    state = edited().with_scene(job=Job("Reconstructing", "reading photos", 0.3))
+
+    def panel(seen: Look) -> list[Command]:
+        imgui.begin("panel")
+        if imgui.is_key_pressed(imgui.Key.f9):
+            imgui.open_popup("menu")
+        if imgui.begin_popup("menu"):
+            imgui.text("Open ...")
+            imgui.end_popup()
+        imgui.end()
+        return keys.draw(state)
+
+    with context(SIZE):
+        imgui.get_io().config_flags |= imgui.ConfigFlags_.nav_enable_keyboard
+        hands = Hands(panel)
+        hands.key(imgui.Key.f9)
+        assert imgui.is_popup_open("", imgui.PopupFlags_.any_popup)
+        hands.key(imgui.Key.escape)
+        assert not imgui.is_popup_open("", imgui.PopupFlags_.any_popup) and hands.issued == []
+        hands.key(imgui.Key.escape)
+        assert hands.issued == [show.CancelJob()]
 
 
 def test_enter_presses_the_control_that_tab_has_led_to() -> None:

@@ -44,7 +44,7 @@ def told(film: Film) -> str:
     """What became of the film's frames."""
     left = [f"{count} {REASONS[key]}" for key, count in film.left_out.items() if count]
     return (
-        f"Of {film.strip.num_looked_at} frames {', '.join(left)}."
+        f"Of {film.strip.num_looked_at} frames, {', '.join(left)}."
         if left
         else f"{film.strip.num_looked_at} frames."
     )

@@ -52,8 +52,10 @@ def _candidates(state: State, look: Look, corner: ImVec2, size: ImVec2) -> None:
             continue
         at, colour = ImVec2(corner.x + x, corner.y + y), widgets.u32(widgets.rgba(prompt.colour))
         imgui.get_window_draw_list().add_circle(at, look.px(26), colour, 0, look.px(2))
-        below = ImVec2(at.x + look.px(30), at.y - look.px(10))
-        _caption(look, below, f"{prompt.text.strip()}?", 0.0)
+        text, aside = f"{prompt.text.strip()}?", look.px(30)
+        fits = x + aside + _wide(look, text) <= size.x  # else it stands on the ring's other side
+        place = ImVec2(at.x + (aside if fits else -aside), at.y - look.px(10))
+        _caption(look, place, text, 0.0 if fits else 1.0)
 
 
 def _keys(state: State, look: Look, corner: ImVec2, size: ImVec2) -> None:
@@ -202,10 +204,15 @@ def _compare(state: State, look: Look, corner: ImVec2, size: ImVec2) -> list[do.
 
 def _caption(look: Look, at: ImVec2, text: str, anchor: float) -> None:
     """A word on a dark ground; `anchor` 0 starts at `at`, 1 ends there."""
-    canvas, extent = imgui.get_window_draw_list(), imgui.calc_text_size(text)
-    width, height = extent.x + look.px(14), extent.y + look.px(6)
+    canvas, width = imgui.get_window_draw_list(), _wide(look, text)
+    height = imgui.get_text_line_height() + look.px(6)
     corner = ImVec2(at.x - anchor * width, at.y)
     end = ImVec2(corner.x + width, corner.y + height)
     canvas.add_rect_filled(corner, end, imgui.IM_COL32(14, 16, 20, 190), look.px(5))
     place = ImVec2(corner.x + look.px(7), corner.y + look.px(3))
     canvas.add_text(place, widgets.u32(theme.DARK.TEXT), text)
+
+
+def _wide(look: Look, text: str) -> float:
+    """How wide its caption is."""
+    return imgui.calc_text_size(text).x + look.px(14)

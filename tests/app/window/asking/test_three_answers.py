@@ -197,7 +197,7 @@ def test_one_photo_is_told_to_leave_depth_a_guess() -> None:
 def test_the_lens_is_told_by_photos_that_are_there() -> None:
     state = shown_scene()
     assert state.scene.info is not None
-    said = "the photos do not record their lens, a field of view of 65° is assumed; set it with --fov"
+    said = "the photos do not record their lens, so a field of view of 65° is assumed; set it with --fov"
     state = state.with_scene(info=replace(state.scene.info, warnings=(said,)), photos=())
     assert tray.WITHOUT_PHOTOS in tray._sentences(state)[0] and "--fov" not in tray._sentences(state)[0]
     before = "assumed field of view 65 degrees; on the command line, --fov tells it"  # in files of before

@@ -242,7 +242,7 @@ def test_the_panel_stays_in_the_window_and_leaves_the_picture_to_see(
 def test_words_of_a_row(listed: State) -> None:
     row = listed.listing.row("table 1")
     assert row is not None
-    size, where = panel.words(replace(row, place=(-0.61, 0.0, 1.24), photos=(0, 2), cut=True), "m")
+    size, where = panel.words(replace(row, place=(-0.61, 0.0, 1.24), photos=(2, 0), cut=True), "m")
     assert size.endswith(" m and more") and where == "0.6 m W, 1.2 m N · photos 1, 3"
     assert panel.words(replace(row, photos=(), place=(1.0, 0.0, -2.0)), "units")[1] == "1.0 u E, 2.0 u S"
 

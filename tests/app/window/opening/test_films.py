@@ -93,7 +93,8 @@ def test_a_dropped_film_shows_its_strip(desk: Desk, walk: Path) -> None:
     assert 10 < len(desk.film.chosen) <= PHOTO_LIMITS.film_photos and desk.state.scene.photos == ()
     pictures = [command for command in desk.performed if isinstance(command, ShowPicture)]
     assert len(pictures) == len(desk.film.strip.stills)
-    assert "Of 40 frames" in panel.told(desk.film) and "lay between them" in panel.told(desk.film)
+    told = panel.told(desk.film)
+    assert told.startswith("Of 40 frames, ") and "lay between the chosen ones" in told
     desk.perform(ShowDialog(None))
     assert len(desk.dropped) == len(pictures), "small pictures go with the dialog"
     entry = next(each for each in table.ENTRIES if each.name.startswith("Frames of the film"))
@@ -238,7 +239,7 @@ def test_what_is_told_of_frames_adds_up_however_they_are_chosen(desk: Desk) -> N
     left = next(index for index in range(len(desk.film.strip.stills)) if index not in desk.film.chosen)
     desk.perform(opening.SwitchFrame(left))
     assert kept() == 40 and sum(told_film(desk.film)["why"].values()) == 40 - len(desk.film.chosen)
-    assert f"{proposed['between'] - 1} lay between them" in panel.told(desk.film)
+    assert f"{proposed['between'] - 1} lay between the chosen ones" in panel.told(desk.film)
     for index in range(len(desk.film.strip.stills)):
         desk.perform(opening.SwitchFrame(index))
         assert kept() == 40 and min(desk.film.left_out.values()) >= 0

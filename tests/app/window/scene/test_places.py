@@ -44,7 +44,7 @@ def test_what_was_left_out_is_said() -> None:
     assert places.left_out(info) == [
         "Could not be placed, too little overlap with other photos: IMG_7.jpg.",
         "Parts of 1 photo (ringed) were left out: other photos show something else there.",
-        "Of 480 frames of walk.mp4 12 were blurred.",
+        "Of 480 frames of walk.mp4, 12 were blurred.",
     ]
     odd = many({"shares": [0.5], "unplaced": "x", "films": [3, {"film": 1}]}).scene.info
     assert odd is not None and places.left_out(odd) == []
