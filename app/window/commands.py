@@ -173,16 +173,21 @@ class EditPalette:
         return replace(state, palette=self.palette)
 
 
+def unsaved(state: State) -> bool:
+    """Whether the scene on show or its edits are in no file."""
+    info = state.scene.info
+    return info is not None and (info.path is None or state.editing.unsaved)
+
+
 @dataclass(frozen=True)
 class Leave:
-    """Close the window; asks first while a scene or its edits are not saved, unless `sure`. Saving then
-    closes it too."""
+    """Close the window; asks first while a scene or its edits are not saved or an export is under way, unless
+    `sure`. Saving then closes it too."""
 
     sure: bool = False
 
     def apply(self, state: State) -> State:
-        info = state.scene.info
-        if info is not None and (info.path is None or state.editing.unsaved) and not self.sure:
+        if (unsaved(state) or state.exporting.running is not None) and not self.sure:
             return replace(state.with_scene(pending=(Leave(sure=True),)), dialog=Dialog.LEAVE)
         return replace(state, leaving=True, dialog=None)
 

@@ -9,7 +9,7 @@ class Dialog(Enum):
     SAVE = "Save the scene"
     OPEN = "Open"
     HELP = "Mouse and keys"
-    LEAVE = "Save before quitting?"
+    LEAVE = "Quit?"
     DROP = "Where do these photos belong?"
     DROP_SCENE = "Open or merge?"
     MERGE = "Merge a scene into this one"

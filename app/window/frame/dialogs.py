@@ -277,10 +277,18 @@ def _help_group(group: str | None, look: Look, room: float) -> None:
 
 
 def _leave(state: State, look: Look) -> list[do.Command]:
-    info = state.scene.info
+    info, export, issued = state.scene.info, state.exporting.running, list[do.Command]()
+    if export is not None:
+        imgui.text_wrapped(f"{export.target.name} is still being written; quitting drops it.")
+    if export is not None and not do.unsaved(state):
+        if widgets.default_button("Wait for it", look.vec(140, 0)):
+            issued.append(do.ShowDialog(None))
+        widgets.beside(look.px(180))
+        if imgui.button("Quit without it", look.vec(180, 0)):
+            issued.append(do.Leave(sure=True))
+        return issued
     lost = "The scene is" if info is None or info.path is None else f"The edits of {info.name} are"
     imgui.text_wrapped(f"{lost} not saved.")
-    issued: list[do.Command] = []
     if widgets.default_button("Save and quit", look.vec(140, 0)):
         issued.append(show.SaveFirst())
     widgets.beside(look.px(180))

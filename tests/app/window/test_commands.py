@@ -9,6 +9,7 @@ from app.window import commands as do
 from app.window.asking import commands as ask
 from app.window.dialogs import Dialog
 from app.window.editing import commands as edit
+from app.window.exporting.state import Running
 from app.window.frame.status import figures, fitting
 from app.window.kit.widgets import sentence
 from app.window.scene import camera
@@ -50,6 +51,15 @@ def test_leaving_asks_while_edits_of_a_saved_scene_are_unsaved() -> None:
     asked = after(saved, edit.Delete(), do.Leave())
     assert not asked.leaving and asked.dialog is Dialog.LEAVE
     assert asked.scene.pending == (do.Leave(sure=True),)
+
+
+def test_leaving_asks_while_an_export_is_under_way(shown: State) -> None:
+    """A film was dropped without a word."""
+    saved = after(shown, show.SceneSaved(Path("s.langflash")))
+    busy = saved.with_exporting(running=Running(Path("walk.mp4")))
+    asked = after(busy, do.Leave())
+    assert not asked.leaving and asked.dialog is Dialog.LEAVE
+    assert after(asked, do.Leave(sure=True)).leaving
 
 
 def test_the_save_dialog_proposes_a_place(shown: State) -> None:

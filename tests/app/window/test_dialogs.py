@@ -12,6 +12,7 @@ from app.window.commands import Command
 from app.window.dialogs import Dialog
 from app.window.editing import cleaning as clean
 from app.window.exporting import commands as export
+from app.window.exporting.state import Running
 from app.window.frame import dialogs, keys
 from app.window.kit import theme
 from app.window.kit.look import Look
@@ -134,6 +135,19 @@ def test_escape_in_a_menu_shuts_the_menu_and_leaves_the_job_alone() -> None:
 def test_enter_presses_the_control_that_tab_has_led_to() -> None:
     issued = pressed(opened(Dialog.LEAVE), imgui.Key.tab, imgui.Key.tab, imgui.Key.enter)
     assert do.Leave(sure=True) in issued and show.SaveFirst() not in issued
+
+
+def test_enter_waits_for_an_export_and_tab_leads_to_quitting_without_it() -> None:
+    """Of a saved scene, of which there is nothing to save."""
+    state = opened(Dialog.LEAVE)
+    assert state.scene.info is not None
+    saved = state.with_scene(info=replace(state.scene.info, path=FILE)).with_editing(
+        saved=state.editing.marks
+    )
+    busy = saved.with_exporting(running=Running(Path("walk.mp4")))
+    issued = pressed(busy, imgui.Key.enter)
+    assert do.ShowDialog(None) in issued and do.Leave(sure=True) not in issued
+    assert do.Leave(sure=True) in pressed(busy, imgui.Key.tab, imgui.Key.tab, imgui.Key.enter)
 
 
 def test_enter_does_not_press_a_button_that_is_disabled() -> None:
