@@ -20,6 +20,7 @@ Checks    constructors refuse shapes that disagree and numbers that name nothing
 """
 
 import math
+import re
 import reprlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, fields, replace
@@ -159,28 +160,27 @@ class Views:
 
     __repr__ = _brief
 
-    def some(self, photos: Sequence[int]) -> "Views":
-        """These photos alone, in this order; the world stays the one of the poses.
+    def without(self, photos: Sequence[int], notes: Sequence[str] = ()) -> "Views":
+        """The others alone, and what people are told of it; warnings that name one of these photos go.
 
         Raises:
-            ValueError: poses are given, and these photos leave out the first, whose camera is the world.
+            ValueError: poses are given, and 0 is left out, whose camera is the world.
         """
-        rows = list(photos)
-        if self.viewmats is not None and rows[:1] != [0]:
-            raise ValueError("photos: expected 0 first, whose camera is the world of the poses")
+        if self.viewmats is not None and 0 in photos:
+            raise ValueError("photos: expected none of 0, whose camera is the world of the poses")
+        rows = [row for row in range(self.num_views) if row not in photos]
         names = tuple(self.names[row] for row in rows)
         lenses = None if self.lenses is None else self.lenses.some(rows)
-        if lenses is not None and not any(name in lenses.note for name in names):
+        if lenses is not None and not _named(lenses.note, names):
             lenses = replace(lenses, note="")
-        note, gone = lenses and lenses.note, set(self.names) - set(names)
+        gone = [self.names[row] for row in photos]
+        kept = tuple(w for w in self.warnings if (lenses and w == lenses.note) or not _named(w, gone))
         return Views(
             images=self.images[rows],
             Ks=self.Ks[rows],
             names=names,
             sources=tuple(self.sources[row] for row in rows) if self.sources else (),
-            warnings=tuple(
-                line for line in self.warnings if line == note or not any(name in line for name in gone)
-            ),
+            warnings=(*kept, *notes),
             viewmats=None if self.viewmats is None else self.viewmats[rows],
             lenses=lenses,
         )
@@ -596,6 +596,11 @@ def _list_names(names: Sequence[str], most: int = 6) -> str:
     """The first of some names in a row, and how many more there are; "-": none."""
     more = [f"{len(names) - most} more"] if len(names) > most else []
     return ", ".join([*names[:most], *more]) or "-"
+
+
+def _named(line: str, names: Sequence[str]) -> bool:
+    """Whether it names one of these photos, and not one whose name has that one in it."""
+    return any(re.search(rf"(?<![\w.-]){re.escape(name)}(?![\w.-]*\w)", line) for name in names)
 
 
 def _shape(name: str, values: Tensor, expected: tuple[int, ...]) -> None:

@@ -149,7 +149,7 @@ def test_the_weight_maps_of_photos_are_gone_when_colours_are_solved_for(weights,
 def test_a_stage_that_leaves_photos_out_gives_the_scene_of_the_others(monkeypatch, weights, photos, scene):
     """Key points of all photos were found beside; those of the others are found again."""
     loaded = stages.load_views
-    monkeypatch.setattr(stages, "load_views", lambda *args, **kwargs: loaded(*args, **kwargs).some([0, 1]))
+    monkeypatch.setattr(stages, "load_views", lambda *args, **kwargs: loaded(*args, **kwargs).without([2]))
     third = asset_path("photos/aloe_left.jpg")
     fewer = lf.reconstruct([*photos, third], weights=weights, size=SMALL)
     assert fewer.record.photos == scene.record.photos

@@ -11,6 +11,7 @@ from PIL import Image
 from langflash_core.errors import ImageError, InputError
 from langflash_core.images.pictures import fitting_size
 from langflash_core.images.views import load_views, source_picture, source_size
+from langflash_core.types import Views
 from tests.images.pictures import exif, room_picture, saved
 
 
@@ -128,24 +129,37 @@ def test_exif_decides_when_nothing_is_given(tmp_path):
     assert not [note for note in load_views([unknown], fov=60).warnings if "assumed" in note]
 
 
-def test_some_of_the_views_are_those_of_their_photos_alone(tmp_path):
-    """Photos of two lenses and one that does not say: each pair of them, and given poses."""
+def test_views_without_some_are_those_of_the_other_photos_alone(tmp_path):
+    """Photos of two lenses and one that does not say, each left out in turn; and given poses."""
     said = ({"exif": exif(focal_35mm=28)}, {}, {"exif": exif(focal_35mm=50)})
     paths = [
         saved(room_picture(400, 300, seed=seed), tmp_path / f"{seed}.jpg", **kept)
         for seed, kept in enumerate(said)
     ]
     whole = load_views(paths)
-    for rows in ([0, 1], [0, 2], [2, 1], [1]):
-        some, alone = whole.some(rows), load_views([paths[row] for row in rows])
+    for gone in ([2], [1], [0], [0, 2]):
+        some = whole.without(gone, ["left out"])
+        alone = load_views([path for row, path in enumerate(paths) if row not in gone])
         assert (some.images == alone.images).all() and (some.Ks == alone.Ks).all()
         assert (some.names, some.sources, some.lenses) == (alone.names, alone.sources, alone.lenses)
-    assert whole.some([0, 2]).warnings == load_views([paths[0], paths[2]]).warnings
+        assert some.warnings == (*alone.warnings, "left out")
     posed = replace(whole, viewmats=torch.eye(4).repeat(3, 1, 1))
-    poses = posed.some([0, 2]).viewmats
+    poses = posed.without([1]).viewmats
     assert poses is not None and poses.shape == (2, 4, 4)
-    with pytest.raises(ValueError, match="expected 0 first"):
-        posed.some([1, 2])
+    with pytest.raises(ValueError, match="expected none of 0"):
+        posed.without([0])
+
+
+def test_a_warning_goes_with_its_photo_and_not_with_one_whose_name_is_a_part_of_it():
+    lines = (
+        "1.jpg is blurred; take it again",
+        "11.jpg is blurred",
+        "1.jpg.jpg is dark",
+        "1.jpg and b.jpg are dark",
+    )
+    names = ("a.jpg", "1.jpg", "11.jpg", "1.jpg.jpg", "b.jpg")
+    views = Views(torch.zeros(5, 3, 14, 14), torch.eye(3).repeat(5, 1, 1), names, warnings=lines)
+    assert views.without([1]).warnings == ("11.jpg is blurred", "1.jpg.jpg is dark")
 
 
 def test_files_of_one_name_are_told_apart(tmp_path):
