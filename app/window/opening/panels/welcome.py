@@ -51,8 +51,8 @@ def draw(state: State, look: Look, corner: ImVec2, size: ImVec2) -> list[do.Comm
     top = corner.y + max((size.y - look.px(tall)) / 2, look.px(12))
     middle = corner.x + size.x / 2
     _line(fa.ICON_FA_CUBES, ImVec2(middle, top + look.px(40)), theme.LINE, 3.0)
-    _line("Drop photos of a room here", ImVec2(middle, top + look.px(72)), theme.TEXT, 1.25)
-    hint = "two or more, taken a step apart; or a film, a scene, or splats"
+    title, hint = invitation(len(state.scene.photos))
+    _line(title, ImVec2(middle, top + look.px(72)), theme.TEXT, 1.25)
     _line(hint, ImVec2(middle, top + look.px(98)))
     issued = _buttons(ImVec2(middle, top + look.px(112)), look)
     below = ImVec2(middle, top + look.px(_TITLE))
@@ -71,6 +71,17 @@ def draw(state: State, look: Look, corner: ImVec2, size: ImVec2) -> list[do.Comm
     if imgui.is_item_clicked() and not issued:
         issued.append(opening.OpenFiles())
     return issued
+
+
+def invitation(num_photos: int) -> tuple[str, str]:
+    """What can be done here, in a word and in a line, while so many photos wait beside it."""
+    if num_photos:
+        plural = "s wait" if num_photos > 1 else " waits"
+        return (
+            f"{num_photos} photo{plural} on the left",
+            "reconstruct the room there, or drop more photos here",
+        )
+    return "Drop photos of a room here", "two or more, taken a step apart; or a film, a scene, or splats"
 
 
 def draw_photos(state: State, look: Look, corner: ImVec2, size: ImVec2) -> None:

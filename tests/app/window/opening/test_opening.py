@@ -12,7 +12,7 @@ from app.window.dialogs import Dialog
 from app.window.effects import Hands
 from app.window.opening import commands as opening
 from app.window.opening import effects, native, work
-from app.window.opening.panels.welcome import working
+from app.window.opening.panels.welcome import invitation, working
 from app.window.opening.pasted import pasted_paths
 from app.window.opening.state import MOST_FILES, Folder
 from app.window.scene import commands as show
@@ -255,3 +255,9 @@ def test_photos_stay_on_show_while_they_are_worked_on() -> None:
 def test_a_folder_with_a_problem_is_not_remembered() -> None:
     state = after(State(), opening.LookInto(), opening.FolderRead(Folder(Path("/gone"), problem="gone")))
     assert state.preferences.folder == ""
+
+
+@pytest.mark.parametrize(("count", "title"), [(0, "Drop photos"), (1, "1 photo waits"), (7, "7 photos wait")])
+def test_the_empty_picture_knows_of_photos_that_wait(count: int, title: str) -> None:
+    """After a cancelled reconstruction it asked for photos while seven lay beside it."""
+    assert invitation(count)[0].startswith(title)
