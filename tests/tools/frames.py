@@ -90,6 +90,13 @@ class Watched(Program):
         self.window = int(self.xdotool("search", "--name", "LangFlash").split()[0])
         self.xdotool("windowmove", str(self.window), "0", "0", "windowfocus", "--sync", str(self.window))
 
+    def _read(self) -> None:
+        assert self._process.stdout is not None
+        for line in self._process.stdout:
+            with self._changed:
+                self._lines.append(json.loads(line))
+                self._changed.notify_all()
+
     def phase(self, name: str) -> None:
         self.phases.append((name, time.perf_counter()))
 
@@ -110,7 +117,10 @@ class Watched(Program):
             )
 
     def end(self) -> dict:
-        self.leave()
+        self.client.close()
+        self._process.terminate()
+        self._reader.join(PATIENCE)
+        self._process.wait(PATIENCE)
         return json.loads(self.record.read_text())
 
 
