@@ -20,7 +20,6 @@ Checks    constructors refuse shapes that disagree and numbers that name nothing
 """
 
 import math
-import re
 import reprlib
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, fields, replace
@@ -105,19 +104,6 @@ class Lenses:
     straightened: tuple[FoundFocal | None, ...] = ()
     straight: bool = False
 
-    def some(self, photos: Sequence[int]) -> "Lenses":
-        """Of these photos alone; lenses that took none of them go."""
-        kept = list(dict.fromkeys(self.of[photo] for photo in photos))
-        return replace(
-            self,
-            of=tuple(kept.index(self.of[photo]) for photo in photos),
-            **{
-                name: tuple(getattr(self, name)[lens] for lens in kept)
-                for name in ("fovs", "doubts", "recorded", "straightened")
-                if getattr(self, name)
-            },
-        )
-
     def found(self, told: Sequence[FoundFocal | None]) -> tuple[FoundLens, ...]:
         """The lenses that photos told."""
         found = []
@@ -159,31 +145,6 @@ class Views:
     lenses: Lenses | None = None
 
     __repr__ = _brief
-
-    def without(self, photos: Sequence[int], notes: Sequence[str] = ()) -> "Views":
-        """The others alone, and what people are told of it; warnings that name one of these photos go.
-
-        Raises:
-            ValueError: poses are given, and 0 is left out, whose camera is the world.
-        """
-        if self.viewmats is not None and 0 in photos:
-            raise ValueError("photos: expected none of 0, whose camera is the world of the poses")
-        rows = [row for row in range(self.num_views) if row not in photos]
-        names = tuple(self.names[row] for row in rows)
-        lenses = None if self.lenses is None else self.lenses.some(rows)
-        if lenses is not None and not _named(lenses.note, names):
-            lenses = replace(lenses, note="")
-        gone = [self.names[row] for row in photos]
-        kept = tuple(w for w in self.warnings if (lenses and w == lenses.note) or not _named(w, gone))
-        return Views(
-            images=self.images[rows],
-            Ks=self.Ks[rows],
-            names=names,
-            sources=tuple(self.sources[row] for row in rows) if self.sources else (),
-            warnings=(*kept, *notes),
-            viewmats=None if self.viewmats is None else self.viewmats[rows],
-            lenses=lenses,
-        )
 
     @property
     def num_views(self) -> int:
@@ -596,11 +557,6 @@ def _list_names(names: Sequence[str], most: int = 6) -> str:
     """The first of some names in a row, and how many more there are; "-": none."""
     more = [f"{len(names) - most} more"] if len(names) > most else []
     return ", ".join([*names[:most], *more]) or "-"
-
-
-def _named(line: str, names: Sequence[str]) -> bool:
-    """Whether it names one of these photos, and not one whose name has that one in it."""
-    return any(re.search(rf"(?<![\w.-]){re.escape(name)}(?![\w.-]*\w)", line) for name in names)
 
 
 def _shape(name: str, values: Tensor, expected: tuple[int, ...]) -> None:

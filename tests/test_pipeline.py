@@ -14,6 +14,7 @@ import langflash_core as lf
 from langflash_core.base.records import FoundFocal
 from langflash_core.base.resources import asset_path
 from langflash_core.errors import Cancelled, ImageError, InputError, PromptError, ViewError, WeightsError
+from langflash_core.images.leaving_out import views_without
 from langflash_core.images.straight import straighten_views
 from langflash_core.language.spaces import language_space
 from langflash_core.level import level_scene
@@ -149,7 +150,8 @@ def test_the_weight_maps_of_photos_are_gone_when_colours_are_solved_for(weights,
 def test_a_stage_that_leaves_photos_out_gives_the_scene_of_the_others(monkeypatch, weights, photos, scene):
     """Key points of all photos were found beside; those of the others are found again."""
     loaded = stages.load_views
-    monkeypatch.setattr(stages, "load_views", lambda *args, **kwargs: loaded(*args, **kwargs).without([2]))
+    fewer_views = lambda *args, **kwargs: views_without(loaded(*args, **kwargs), [2])  # noqa: E731
+    monkeypatch.setattr(stages, "load_views", fewer_views)
     third = asset_path("photos/aloe_left.jpg")
     fewer = lf.reconstruct([*photos, third], weights=weights, size=SMALL)
     assert fewer.record.photos == scene.record.photos

@@ -9,6 +9,7 @@ import torch
 from PIL import Image
 
 from langflash_core.errors import ImageError, InputError
+from langflash_core.images.leaving_out import views_without
 from langflash_core.images.pictures import fitting_size
 from langflash_core.images.views import load_views, source_picture, source_size
 from langflash_core.types import Views
@@ -138,16 +139,16 @@ def test_views_without_some_are_those_of_the_other_photos_alone(tmp_path):
     ]
     whole = load_views(paths)
     for gone in ([2], [1], [0], [0, 2]):
-        some = whole.without(gone, ["left out"])
+        some = views_without(whole, gone, ["left out"])
         alone = load_views([path for row, path in enumerate(paths) if row not in gone])
         assert (some.images == alone.images).all() and (some.Ks == alone.Ks).all()
         assert (some.names, some.sources, some.lenses) == (alone.names, alone.sources, alone.lenses)
         assert some.warnings == (*alone.warnings, "left out")
     posed = replace(whole, viewmats=torch.eye(4).repeat(3, 1, 1))
-    poses = posed.without([1]).viewmats
+    poses = views_without(posed, [1]).viewmats
     assert poses is not None and poses.shape == (2, 4, 4)
     with pytest.raises(ValueError, match="expected none of 0"):
-        posed.without([0])
+        views_without(posed, [0])
 
 
 def test_a_warning_goes_with_its_photo_and_not_with_one_whose_name_is_a_part_of_it():
@@ -159,7 +160,7 @@ def test_a_warning_goes_with_its_photo_and_not_with_one_whose_name_is_a_part_of_
     )
     names = ("a.jpg", "1.jpg", "11.jpg", "1.jpg.jpg", "b.jpg")
     views = Views(torch.zeros(5, 3, 14, 14), torch.eye(3).repeat(5, 1, 1), names, warnings=lines)
-    assert views.without([1]).warnings == ("11.jpg is blurred", "1.jpg.jpg is dark")
+    assert views_without(views, [1]).warnings == ("11.jpg is blurred", "1.jpg.jpg is dark")
 
 
 def test_files_of_one_name_are_told_apart(tmp_path):
