@@ -17,20 +17,20 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 import torch
-from jaxtyping import Bool, Float, UInt8
+from jaxtyping import Bool, Float
 
 from langflash_core.base.picture_files import STORED, opened_picture
 from langflash_core.base.records import Guess, World
 from langflash_core.errors import InputError, LangFlashError
+from langflash_core.geometry.lines import edge_planes
 from langflash_core.geometry.manhattan import Directions, Sights, found_directions
-from langflash_core.images.lines import line_segments
+from langflash_core.geometry.rotations import turn_of
+from langflash_core.geometry.surfels import covered_areas, normals_of
 from langflash_core.language.answers import world_points
 from langflash_core.language.gaussians import gaussian_relevance
 from langflash_core.language.relevance import compile_query
 from langflash_core.language.spaces import language_space
-from langflash_core.scene.standing import normals_of
-from langflash_core.scene.thin import covered_areas
-from langflash_core.scene.world import transform_scene, turn_of
+from langflash_core.scene.world import transform_scene
 from langflash_core.splat import render
 from langflash_core.types import NO_LANGUAGE, Camera, Scene
 
@@ -273,22 +273,6 @@ def _sights(scene: Scene, surface: Surface) -> Sights:
         across = np.linalg.eigh(surface.normals[floor].T @ surface.normals[floor])[1][:, 2]
     cameras = scene.viewmats[:, :3, :3].double().numpy()
     return Sights(np.concatenate(edges), np.concatenate(lengths), surface.normals[known], cameras, across)
-
-
-def edge_planes(
-    grey: UInt8[np.ndarray, "H W"], camera: Camera
-) -> tuple[Float[np.ndarray, "L 3"], Float[np.ndarray, " L"]]:
-    """Unit normals, in the world, of the planes through the camera and a photo's straight edges; the edges'
-    lengths, in longer sides of the photo."""
-    ends = line_segments(grey)
-    inverse = np.linalg.inv(camera.K.double().numpy())
-    first, last = (
-        np.concatenate((ends[:, at : at + 2], np.ones((len(ends), 1))), 1) @ inverse.T for at in (0, 2)
-    )
-    normals = np.cross(first, last)
-    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
-    lengths = np.hypot(ends[:, 2] - ends[:, 0], ends[:, 3] - ends[:, 1]) / max(grey.shape)
-    return normals @ camera.viewmat[:3, :3].double().numpy(), lengths
 
 
 def _grey(photo: bytes) -> np.ndarray | None:

@@ -11,6 +11,7 @@ from torch import Tensor
 
 from langflash_core.errors import PromptError
 from langflash_core.geometry.harmonics import SH_C0
+from langflash_core.geometry.surfels import covered_areas
 from langflash_core.language.gaussians import gaussian_relevance
 from langflash_core.language.looks import lab, room_white
 from langflash_core.language.narrowing import Sight, choose, likely, viewer_axes
@@ -18,7 +19,6 @@ from langflash_core.language.relevance import CompiledQuery
 from langflash_core.language.spaces import language_space
 from langflash_core.language.spoken import compile_spoken
 from langflash_core.scene.instances import parts_of
-from langflash_core.scene.thin import covered_areas
 from langflash_core.scene.world import upward
 from langflash_core.types import Scene
 

@@ -19,13 +19,13 @@ from torch import Tensor
 from langflash_core.export import open_scene
 from langflash_core.geometry.fusion import ColouredView, Surface, fuse
 from langflash_core.geometry.harmonics import SH_C0
+from langflash_core.geometry.surfels import covered_areas
 from langflash_core.language.answers import oriented_box
 from langflash_core.language.settings import ANSWERING
 from langflash_core.language.spaces import language_space
 from langflash_core.language.spoken import compile_spoken
 from langflash_core.meant import check_threshold, meant_relevance
 from langflash_core.scene.instances import disc_radii, things
-from langflash_core.scene.thin import covered_areas
 from langflash_core.splat.visibility import seen_shares
 from langflash_core.types import Camera, Frame, Record, Scene, SegmentedView, Segments, Semantics
 

@@ -10,6 +10,7 @@ import torch
 from langflash_core import level
 from langflash_core.base.records import SURE, Guess, World
 from langflash_core.errors import InputError
+from langflash_core.geometry.rotations import turn_of
 from langflash_core.level import (
     NOT_SURE,
     Evidence,
@@ -21,7 +22,6 @@ from langflash_core.level import (
     seen_at,
     upright,
 )
-from langflash_core.scene.world import turn_of
 from langflash_core.types import Gaussians
 from tests.boxroom import EYE, HIGH, METRES, box_room, true_up, without_language
 

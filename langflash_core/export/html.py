@@ -47,10 +47,10 @@ from langflash_core.export.page_columns import (
 from langflash_core.export.settings import PAINTING
 from langflash_core.geometry.cameras import invert_rigid
 from langflash_core.geometry.poses import from_view
+from langflash_core.geometry.rotations import turn_of
 from langflash_core.scene.exposure import median_distance
 from langflash_core.scene.settings import EXPOSURE
 from langflash_core.scene.tour import Stop, read_tour
-from langflash_core.scene.world import turn_of
 from langflash_core.types import Scene
 
 SCRIPTS = (

@@ -9,6 +9,8 @@ import numpy as np
 import pyrr
 from jaxtyping import Float, Num
 
+from langflash_core.base.records import World
+
 Quaternion = tuple[float, float, float, float]  # wxyz
 
 
@@ -20,6 +22,11 @@ def about(axis: Num[np.ndarray, "3"], angle: float) -> Float[np.ndarray, "3 3"]:
 def matrix(quat: Quaternion) -> Float[np.ndarray, "3 3"]:
     """Of a unit quaternion."""
     return pyrr.matrix33.create_from_quaternion(_xyzw(quat))
+
+
+def turn_of(world: World) -> Float[np.ndarray, "3 3"]:
+    """Rows east, down and north of a world, in the scene's axes."""
+    return matrix(world.turn)
 
 
 def quaternion(R: Float[np.ndarray, "3 3"]) -> Quaternion:

@@ -47,6 +47,19 @@ MANHATTAN = Manhattan()
 
 
 @dataclass(frozen=True)
+class Surfels:
+    """Flat elements of a surface (`geometry.surfels`)."""
+
+    stretch: float = 5.0
+    """Footprints of a pixel, at most, that a surface seen edge-on reaches over."""
+    flat: float = 0.5
+    """Of a Gaussian's second axis, at most its third: it has a normal."""
+
+
+SURFELS = Surfels()
+
+
+@dataclass(frozen=True)
 class Vantage:
     """Photos that stand for the others (`geometry.vantage`)."""
 

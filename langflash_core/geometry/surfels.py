@@ -3,12 +3,15 @@
 Sizes: ... any leading sizes, H W pixels.
 """
 
+import numpy as np
 import torch
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 from torch import Tensor
 from torch.nn import functional as F
 
-STRETCH = 5.0  # a surface seen edge-on is not stretched further than this many footprints
+from langflash_core.geometry.quaternions import quats_to_matrices
+from langflash_core.geometry.settings import SURFELS
+from langflash_core.types import Gaussians
 
 
 def spans(
@@ -30,7 +33,7 @@ def _difference(pos_c: Tensor, dim: int, footprint: Tensor) -> Tensor:
     after = torch.cat((steps, steps.narrow(dim, -1, 1)), dim) if steps.shape[dim] else before
     shorter = torch.where((before.norm(dim=-1) < after.norm(dim=-1))[..., None], before, after)
     longest = shorter.norm(dim=-1, keepdim=True).clamp_min(1e-12)
-    return shorter * (STRETCH * footprint[..., None] / longest).clamp_max(1)
+    return shorter * (SURFELS.stretch * footprint[..., None] / longest).clamp_max(1)
 
 
 def ellipses(
@@ -96,3 +99,26 @@ def towards_nearer(log_depths: Float[Tensor, "*n H W"], jump: float) -> Float[Te
         after, before = steps_along(log_depths, dim)
         signs.append((after < -jump).to(log_depths) - (before < -jump).to(log_depths))
     return torch.stack(signs, -1)
+
+
+def finite_rows(values: Float[Tensor, "N d"]) -> Bool[Tensor, " N"]:
+    """Rows (N, d) without NaN and infinity, on the CPU."""
+    return torch.isfinite(values.detach().cpu()).all(-1)
+
+
+def covered_areas(gaussians: Gaussians) -> Float[np.ndarray, " N"]:
+    """Opacity times the product of the two longest axes (N,) float64; 0 where a value is not finite."""
+    axes = gaussians.scales.detach().cpu().double().abs().sort(-1).values
+    areas = gaussians.opacities.detach().cpu().double() * axes[:, 1] * axes[:, 2]
+    finite = finite_rows(gaussians.means) & finite_rows(gaussians.quats) & torch.isfinite(areas)
+    return torch.where(finite, areas, 0.0).numpy()
+
+
+def normals_of(gaussians: Gaussians) -> Float[np.ndarray, "N 3"]:
+    """The shortest axis of each Gaussian; 0 of those that are not flat."""
+    scales = gaussians.scales.double().numpy()
+    ordered = np.sort(scales, 1)
+    axes = quats_to_matrices(gaussians.quats.double()).numpy()
+    normals = np.take_along_axis(axes, scales.argmin(1)[:, None, None], 2)[:, :, 0]
+    flat = ordered[:, 0] <= SURFELS.flat * ordered[:, 1]
+    return np.where(flat[:, None], np.nan_to_num(normals), 0.0)

@@ -20,10 +20,10 @@ from scipy.spatial.transform import Rotation
 from langflash_core.base.picture_files import STORED, opened_picture
 from langflash_core.errors import InputError
 from langflash_core.geometry.cameras import invert_rigid
+from langflash_core.geometry.rotations import turn_of
 from langflash_core.inventory.settings import ALIGNMENT
 from langflash_core.inventory.things import Inventory
 from langflash_core.language.settings import ANSWERING
-from langflash_core.scene.world import turn_of
 from langflash_core.types import Camera, Frame
 
 Render = Callable[..., Frame]  # (scene, camera, weight_maps=True)

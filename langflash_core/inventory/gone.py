@@ -18,12 +18,12 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
 from langflash_core.geometry.harmonics import SH_C0
+from langflash_core.geometry.rotations import turn_of
 from langflash_core.inventory.alignment import Fit, Render
 from langflash_core.inventory.settings import GONE
 from langflash_core.inventory.things import Inventory
 from langflash_core.language.settings import ANSWERING
 from langflash_core.scene.instances import touching
-from langflash_core.scene.world import turn_of
 from langflash_core.types import Camera, Scene, Semantics
 
 

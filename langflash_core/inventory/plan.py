@@ -19,11 +19,10 @@ from scipy.ndimage import gaussian_filter1d
 from scipy.spatial import KDTree
 
 from langflash_core.base.records import Guess
+from langflash_core.geometry.rotations import turn_of
+from langflash_core.geometry.surfels import covered_areas, normals_of
 from langflash_core.inventory.settings import FLOOR_PLAN
 from langflash_core.inventory.things import OPENINGS, Inventory, Thing, kinds_of
-from langflash_core.scene.standing import normals_of
-from langflash_core.scene.thin import covered_areas
-from langflash_core.scene.world import turn_of
 
 _OF_WALLS = ("wall", *OPENINGS)
 

@@ -24,6 +24,8 @@ from torch import Tensor
 from langflash_core.base.records import Guess, World
 from langflash_core.errors import InputError
 from langflash_core.export import open_scene
+from langflash_core.geometry.rotations import turn_of
+from langflash_core.geometry.surfels import covered_areas
 from langflash_core.inventory.apart import DEEPEST, taken_apart
 from langflash_core.inventory.pieces import STRUCTURE, Parts, parts_of_room
 from langflash_core.inventory.settings import LISTING
@@ -34,8 +36,6 @@ from langflash_core.language.spaces import language_space
 from langflash_core.language.vocabulary import OWN
 from langflash_core.level import found_world, metres_of
 from langflash_core.scene.regions import regions_of
-from langflash_core.scene.thin import covered_areas
-from langflash_core.scene.world import turn_of
 from langflash_core.segments import evenly, photo_shares
 from langflash_core.surface.fused import fused_rows, told_in_layers
 from langflash_core.types import Scene, Segments

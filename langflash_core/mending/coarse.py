@@ -22,8 +22,8 @@ from torch.nn.functional import normalize
 
 from langflash_core.geometry.harmonics import SH_C0, colour_to_sh
 from langflash_core.geometry.quaternions import matrices_to_quats
+from langflash_core.geometry.surfels import covered_areas
 from langflash_core.mending.settings import COARSENING
-from langflash_core.scene.thin import covered_areas
 from langflash_core.scene.weights import renormalise, sparse_weights
 from langflash_core.types import Gaussians, Scene, Semantics
 

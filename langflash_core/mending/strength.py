@@ -24,11 +24,11 @@ from scipy.spatial import KDTree
 from langflash_core.errors import InputError
 from langflash_core.geometry.cameras import invert_rigid
 from langflash_core.geometry.quaternions import quats_to_matrices
+from langflash_core.geometry.surfels import covered_areas
 from langflash_core.mending.settings import CRUMBS
 from langflash_core.scene.instances import connected_parts
 from langflash_core.scene.selection import isolation
 from langflash_core.scene.settings import INSTANCES
-from langflash_core.scene.thin import covered_areas
 from langflash_core.types import Scene
 
 from .recipes import KINDS

@@ -10,10 +10,10 @@ from PIL import Image
 from torch.nn.functional import normalize
 
 from langflash_core.base.picture_files import STORED, opened_picture
+from langflash_core.geometry.surfels import covered_areas
 from langflash_core.rig.projected import project_points
 from langflash_core.scene.selection import strongest_atoms
 from langflash_core.scene.settings import ATOM_PICTURES
-from langflash_core.scene.thin import covered_areas
 from langflash_core.types import Scene
 
 

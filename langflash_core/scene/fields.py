@@ -113,8 +113,3 @@ def field_bytes(scene: Scene) -> dict[str, int]:
     sizes = {name: values.numel() * values.element_size() for name, values in to_fields(scene).items()}
     named = {name: size for name, size in sizes.items() if name in (*REQUIRED, *_OPTIONAL)}
     return {**named, "photos": sum(sizes.values()) - sum(named.values())}
-
-
-def stored_bytes(scene: Scene) -> int:
-    """Bytes of all stored tensors, without the file's header."""
-    return sum(field_bytes(scene).values())

@@ -17,9 +17,9 @@ from torch import Tensor
 from torch.nn.functional import normalize
 
 from langflash_core.errors import InputError
+from langflash_core.geometry.surfels import covered_areas
 from langflash_core.scene.joining import append_part
 from langflash_core.scene.settings import JOINING
-from langflash_core.scene.thin import covered_areas
 from langflash_core.types import Scene
 
 

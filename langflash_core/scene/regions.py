@@ -33,11 +33,11 @@ from scipy.sparse.csgraph import connected_components
 
 from langflash_core.geometry.cameras import invert_rigid, world_points
 from langflash_core.geometry.harmonics import SH_C0
+from langflash_core.geometry.surfels import covered_areas
 from langflash_core.rig.projected import project_points
 from langflash_core.scene.instances import touching
 from langflash_core.scene.selection import strongest_atoms
 from langflash_core.scene.settings import REGIONS
-from langflash_core.scene.thin import covered_areas
 from langflash_core.types import Scene
 
 

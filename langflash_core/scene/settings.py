@@ -293,8 +293,6 @@ SELECTION = Selection()
 class Standing:
     """Which way up a scene without photos stands (`scene.standing`)."""
 
-    flat: float = 0.5
-    """Of a Gaussian's second axis, at most its third: it has a normal."""
     level: float = math.cos(math.radians(30))
     """Cosine with up, from which a surface is level."""
     seen: float = 0.1

@@ -1,4 +1,4 @@
-"""How splats stand by their shapes alone: their normals, and whether they stand on their head.
+"""Whether splats stand on their head, by their shapes alone.
 
 Two signs, +y being down. What was predicted from photos lies in one cone ahead of the first camera, so what
 lies in one behind the origin was turned half around x or y. Else photos are taken from above the ground and
@@ -6,23 +6,11 @@ see little of ceilings: a scene whose level surfaces are nearly all at its top i
 """
 
 import numpy as np
-from jaxtyping import Float
 
-from langflash_core.geometry.quaternions import quats_to_matrices
+from langflash_core.geometry.surfels import covered_areas, normals_of
 from langflash_core.scene.bare import in_one_cone
 from langflash_core.scene.settings import STANDING
-from langflash_core.scene.thin import covered_areas
 from langflash_core.types import Gaussians
-
-
-def normals_of(gaussians: Gaussians) -> Float[np.ndarray, "N 3"]:
-    """The shortest axis of each Gaussian; 0 of those that are not flat."""
-    scales = gaussians.scales.double().numpy()
-    ordered = np.sort(scales, 1)
-    axes = quats_to_matrices(gaussians.quats.double()).numpy()
-    normals = np.take_along_axis(axes, scales.argmin(1)[:, None, None], 2)[:, :, 0]
-    flat = ordered[:, 0] <= STANDING.flat * ordered[:, 1]
-    return np.where(flat[:, None], np.nan_to_num(normals), 0.0)
 
 
 def on_its_head(gaussians: Gaussians) -> bool:

@@ -5,8 +5,8 @@ from dataclasses import replace
 import numpy as np
 import torch
 from jaxtyping import Float, Int
-from torch import Tensor
 
+from langflash_core.geometry.surfels import covered_areas, finite_rows
 from langflash_core.types import Gaussians, Scene
 
 _THIRD = 1 / 3
@@ -100,7 +100,7 @@ def _detail_worth(coarse: Gaussians, detail: Gaussians) -> np.ndarray:
     from scipy.spatial import KDTree
 
     areas = covered_areas(detail)
-    there, own = (_finite(each.means).numpy() for each in (coarse, detail))
+    there, own = (finite_rows(each.means).numpy() for each in (coarse, detail))
     tells = np.zeros(len(areas))
     if there.any() and own.any():
         near = KDTree(coarse.means.cpu().numpy()[there]).query(detail.means.cpu().numpy()[own])[1]
@@ -130,18 +130,6 @@ def coarse_share(scene: Scene) -> float:
     """Share of the Gaussians that are coarse, in (0, 1]; 1 where nobody knows, or all are one level."""
     count = 0 if scene.levels is None else int((scene.levels == 0).sum())
     return count / len(scene.gaussians) if count else 1.0
-
-
-def covered_areas(gaussians: Gaussians) -> Float[np.ndarray, " N"]:
-    """Opacity times the product of the two longest axes (N,) float64; 0 where a value is not finite."""
-    axes = gaussians.scales.detach().cpu().double().abs().sort(-1).values
-    areas = gaussians.opacities.detach().cpu().double() * axes[:, 1] * axes[:, 2]
-    finite = _finite(gaussians.means) & _finite(gaussians.quats) & torch.isfinite(areas)
-    return torch.where(finite, areas, 0.0).numpy()
-
-
-def _finite(values: Tensor) -> Tensor:
-    return torch.isfinite(values.detach().cpu()).all(-1)
 
 
 def inclusion(sizes: Float[np.ndarray, " N"], expected: float) -> Float[np.ndarray, " N"]:

@@ -10,9 +10,9 @@ from jaxtyping import Float
 from torch import Tensor
 
 from langflash_core.base.records import World
-from langflash_core.geometry import rotations
 from langflash_core.geometry.cameras import invert_rigid, transform
 from langflash_core.geometry.poses import Vector, read_pose, told_pose
+from langflash_core.geometry.rotations import matrix, quaternion, turn_of
 from langflash_core.geometry.turning import turned_quats, turned_sh
 from langflash_core.scene.tour import read_tour, told_tour
 from langflash_core.types import Gaussians, Scene
@@ -54,11 +54,6 @@ def transform_scene(
     return whole.with_record(camera_path=path, tour=tour) if path or tour else whole
 
 
-def turn_of(world: World) -> Float[np.ndarray, "3 3"]:
-    """Rows east, down and north of a world, in the scene's axes."""
-    return rotations.matrix(world.turn)
-
-
 def upward(world: World | None) -> Float[np.ndarray, " 3"]:
     """Unit vector that points up, in the scene's axes; as the first photo was held, where nobody knows."""
     return np.array([0.0, -1.0, 0.0]) if world is None else -turn_of(world)[1]
@@ -98,7 +93,7 @@ def _placed_key(
     try:
         centre = unit * turn @ (np.array(key["centre"], float) - origin)
         w, x, y, z = map(float, key["rotation"])
-        rotation = rotations.quaternion(turn @ rotations.matrix((w, x, y, z)))
+        rotation = quaternion(turn @ matrix((w, x, y, z)))
         lengths = {name: unit * float(key[name]) for name in ("reach", "span") if key.get(name) is not None}
     except (TypeError, ValueError, LookupError):
         return key

@@ -16,7 +16,6 @@ from torch import Tensor
 
 from langflash_core.geometry.harmonics import SH_C0
 from langflash_core.rig.projected import project_points
-from langflash_core.scene.fields import stored_bytes
 from langflash_core.scene.weights import renormalise
 from langflash_core.surface.settings import PRUNING
 from langflash_core.types import Gaussians, Scene, Semantics
@@ -45,7 +44,7 @@ def prune(
             largest difference of a channel.
 
     Returns:
-        Scene with `pruning` in its record: counts and bytes before and after.
+        Scene with `pruning` in its record: counts before and after.
 
     Source: the linear compositing of the scene's colours and weights; two coincident layers
     o1, o2 composite to opacity 1 - (1 - o1)(1 - o2).
@@ -65,8 +64,6 @@ def prune(
         "atoms_after": small.semantics.num_atoms,
         "weights_before": int((scene.semantics.weight_values > 0).sum()),
         "weights_after": int((small.semantics.weight_values > 0).sum()),
-        "bytes_before": stored_bytes(scene),
-        "bytes_after": stored_bytes(small),
     }
     cost = scene.record.cost
     cost = replace(cost, timings={**cost.timings, "pruning": time.perf_counter() - start})

@@ -33,13 +33,13 @@ from langflash_core.geometry.poses import (
     tour_seconds,
 )
 from langflash_core.geometry.reach import median_reach
+from langflash_core.geometry.rotations import turn_of
 from langflash_core.geometry.tours import RATE, along, even
 from langflash_core.language.relevance import CompiledQuery
 from langflash_core.language.spaces import language_space
 from langflash_core.language.spoken import compile_spoken
 from langflash_core.scene.exposure import lit_camera
 from langflash_core.scene.tour import read_tour
-from langflash_core.scene.world import turn_of
 from langflash_core.types import NO_LANGUAGE, Camera, Scene
 from langflash_core.writing.cameras import camera_of
 from langflash_core.writing.encoding import open_encoder

@@ -8,7 +8,8 @@ import torch
 
 from langflash_core.geometry.cameras import rays, unproject
 from langflash_core.geometry.quaternions import matrices_to_quats, quats_to_matrices
-from langflash_core.geometry.surfels import STRETCH, ellipses, spans
+from langflash_core.geometry.settings import SURFELS
+from langflash_core.geometry.surfels import ellipses, spans
 
 K = torch.tensor([[40.0, 0, 16], [0, 44.0, 12], [0, 0, 1]], dtype=torch.float64)
 EXACT = 1e-12  # float64, a dozen operations on numbers of about 1
@@ -160,7 +161,7 @@ def _twin(pos: np.ndarray, footprint: np.ndarray, row: int, column: int, step: t
     if not found:
         return np.zeros(3)
     span = min(found, key=np.linalg.norm)
-    return span * min(1.0, STRETCH * footprint[row, column] / np.linalg.norm(span))
+    return span * min(1.0, SURFELS.stretch * footprint[row, column] / np.linalg.norm(span))
 
 
 @pytest.mark.parametrize("size", [(24, 32), (1, 7), (7, 1), (2, 2), (1, 1)])
@@ -200,13 +201,13 @@ def test_at_a_jump_both_sides_keep_to_themselves():
 
 
 def test_what_stands_alone_is_not_stretched_over_the_jump():
-    """A column one pixel wide before a wall has no nearer side: STRETCH footprints at most."""
+    """A column one pixel wide before a wall has no nearer side: SURFELS.stretch footprints at most."""
     depths = torch.full((24, 32), 20.0, dtype=torch.float64)
     depths[:, 16] = 2.0
     pos, footprint = _surface(depths)
     span_u, span_v = spans(pos, footprint)
-    assert (span_u.norm(dim=-1) <= STRETCH * footprint * (1 + EXACT)).all()
-    assert (span_u[:, 16].norm(dim=-1) - STRETCH * 2 / 40).abs().max() < EXACT
+    assert (span_u.norm(dim=-1) <= SURFELS.stretch * footprint * (1 + EXACT)).all()
+    assert (span_u[:, 16].norm(dim=-1) - SURFELS.stretch * 2 / 40).abs().max() < EXACT
     assert (span_v[:, 16, 2]).abs().max() < EXACT
 
 

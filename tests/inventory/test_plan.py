@@ -7,9 +7,9 @@ import numpy as np
 import pytest
 import torch
 
+from langflash_core.geometry.rotations import turn_of
 from langflash_core.inventory import inventory
 from langflash_core.inventory.plan import _doubt, floor_plan, goes_through, weighted_quantile
-from langflash_core.scene.world import turn_of
 from tests.boxroom import DEEP, EYE, METRES, TABLE, WIDE, box_room
 from tests.inventory.test_things import with_more
 

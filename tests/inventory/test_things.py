@@ -8,10 +8,10 @@ import pytest
 import torch
 
 from langflash_core.errors import InputError, PromptError
+from langflash_core.geometry.rotations import turn_of
 from langflash_core.inventory import inventory
 from langflash_core.inventory.things import upright_box
 from langflash_core.scene.joining import append_part
-from langflash_core.scene.world import turn_of
 from tests.boxroom import (
     CHAIRS,
     EYE,

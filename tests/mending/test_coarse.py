@@ -7,9 +7,9 @@ import pytest
 import torch
 
 from langflash_core.geometry.harmonics import SH_C0
+from langflash_core.geometry.surfels import covered_areas
 from langflash_core.mending.coarse import coarsen, quantise_colours
 from langflash_core.mending.settings import COARSENING
-from langflash_core.scene.thin import covered_areas
 
 SIDE = 0.15
 

@@ -8,6 +8,7 @@ import torch
 from torch.nn.functional import normalize
 
 from langflash_core.errors import InputError
+from langflash_core.geometry.surfels import covered_areas
 from langflash_core.language.spaces import language_space
 from langflash_core.language.taught import taught_dictionary
 from langflash_core.scene import lone
@@ -16,7 +17,6 @@ from langflash_core.scene.edits import Marks, allow_atom, deny_atom
 from langflash_core.scene.file import load, save
 from langflash_core.scene.joining import join_scenes
 from langflash_core.scene.lone import mean_meaning, with_lone_part
-from langflash_core.scene.thin import covered_areas
 from langflash_core.types import Scene
 from tests.boxroom import WORDS, box_room
 

@@ -8,9 +8,11 @@ Read as text: nothing of a checkout is imported. The lab is left out. What is co
 - reprojections: functions that say themselves where points lie in a photo
 - neighbour rules: functions that choose photos for a photo, or pairs of photos
 - bare participles: functions whose name is one (`told`, `blended`)
-- rooms, returns: modules that `pipeline.reconstruct` gets into by calls, in the order of the source, each
-  function once; and how often it gets into one that it had left. A method that one class alone has is that
+- rooms, returns: folders that `pipeline.reconstruct` gets into by calls, in the order of the source, each
+  function once; and how often it gets into one that it had left. Aside stand those that hold arithmetic and
+  data alone, and the corridor that calls one after the other. A method that one class alone has is that
   one's where the module that calls imports its module, itself or through others
+- modules, their returns: the same of single modules, none aside
 """
 
 import argparse
@@ -18,11 +20,13 @@ import ast
 import re
 import sys
 from collections.abc import Iterator
+from itertools import groupby
 from pathlib import Path
 
 CORE = "langflash_core"
 START = f"{CORE}.pipeline.reconstruct"
 PRIMITIVES = (f"{CORE}.geometry.cameras", f"{CORE}.geometry.pinhole", f"{CORE}.rig")
+ASIDE = ("base", "errors", "geometry", "pipeline", "reconstruction", "rig", "types")
 FUNCTIONS = (ast.FunctionDef, ast.AsyncFunctionDef)
 IRREGULAR = re.compile(
     "begun|bent|bound|brought|built|caught|chosen|cut|done|drawn|felt|found|given|gone|grown|held|kept|known|"
@@ -190,8 +194,14 @@ class Walk:
         return []
 
     @property
-    def returns(self) -> int:
-        return len(self.entered) - len(set(self.entered))
+    def rooms(self) -> list[str]:
+        """Folders in the order of calls; a module outside folders is one."""
+        folders = [name.split(".")[1] for name in self.entered]
+        return [name for name, _ in groupby(name for name in folders if name not in ASIDE)]
+
+
+def _returns(entered: list[str]) -> int:
+    return len(entered) - len(set(entered))
 
 
 def counts(checkout: Path) -> dict[str, list[str] | int]:
@@ -212,8 +222,10 @@ def counts(checkout: Path) -> dict[str, list[str] | int]:
         "neighbour rules": [f"{m}.{name}" for m, name, node in outside if is_neighbour_rule(node)],
         "bare participles": [f"{m}.{name}" for m, name, _ in every if is_bare_participle(name)],
         "functions": len(every),
-        "rooms": sorted(set(walk.entered)),
-        "returns": walk.returns,
+        "rooms": sorted(set(walk.rooms)),
+        "returns": _returns(walk.rooms),
+        "modules": sorted(set(walk.entered)),
+        "their returns": _returns(walk.entered),
     }
 
 

@@ -219,7 +219,7 @@ def _part(
     scene: "Scene", own: "Tensor", kinds: np.ndarray, relevance: "Tensor", shares: "Tensor", rows: Mask
 ) -> Part:
     """What there is to say of one part; own: (N,) bool, shares: (V,) of photos."""
-    from langflash_core.scene.thin import covered_areas
+    from langflash_core.geometry.surfels import covered_areas
 
     some = scene.rows(own)
     areas = covered_areas(some.gaussians) + 1e-12

@@ -15,9 +15,9 @@ import numpy as np
 from jaxtyping import Bool, Float, Integer
 from scipy.ndimage import distance_transform_edt
 
+from langflash_core.geometry.surfels import covered_areas
 from langflash_core.lab.training.measures import nan_mean
 from langflash_core.scene.regions import Regions, regions_of
-from langflash_core.scene.thin import covered_areas
 from langflash_core.splat.picking import seen_in
 from langflash_core.types import Scene
 

@@ -24,6 +24,7 @@ from scipy.ndimage import distance_transform_edt
 from langflash_core.base.files import make_folder
 from langflash_core.base.records import World
 from langflash_core.base.running import Progress
+from langflash_core.geometry.rotations import turn_of
 from langflash_core.inventory import Inventory, Thing, inventory
 from langflash_core.inventory.plan import Plan, floor_plan
 from langflash_core.inventory.things import OPENINGS, STRUCTURE
@@ -44,7 +45,6 @@ from langflash_core.level import found_world
 from langflash_core.pipeline import reconstruct
 from langflash_core.reconstruction.networks import Networks
 from langflash_core.scene.file import load, save
-from langflash_core.scene.world import turn_of
 from langflash_core.types import Scene
 
 TIMES = 2

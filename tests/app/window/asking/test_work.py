@@ -21,12 +21,12 @@ from app.window.scene.work import describe_scene
 from app.window.state import State
 from app.window.viewport import Viewport
 from app.window.worker import Worker
+from langflash_core.geometry.surfels import covered_areas
 from langflash_core.language import minilm
 from langflash_core.language.relevance import compile_query, relevance_maps
 from langflash_core.language.spaces import encode_cached, language_space
 from langflash_core.scene.edited import first_marks
 from langflash_core.scene.edits import Mask, delete
-from langflash_core.scene.thin import covered_areas
 from langflash_core.splat import render
 from langflash_core.types import Semantics
 from tests.app.window.asking.test_prompt_sets import a_set

@@ -26,12 +26,12 @@ from app.window.scene.work import WriteScene, describe_scene
 from app.window.state import State
 from langflash_core.base import outputs
 from langflash_core.geometry import poses
+from langflash_core.geometry.rotations import turn_of
 from langflash_core.inventory import inventory
 from langflash_core.level import found_world
 from langflash_core.scene.edited import edited_scene
 from langflash_core.scene.file import load
 from langflash_core.scene.mask import Mask
-from langflash_core.scene.world import turn_of
 from langflash_core.types import Scene
 from tests.app.window.headless import box, context, frames, look
 from tests.app.window.scenes import after

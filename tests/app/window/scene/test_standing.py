@@ -22,9 +22,9 @@ from app.window.state import State
 from langflash_core.base.records import Guess, World
 from langflash_core.geometry import poses, rotations
 from langflash_core.geometry.poses import Vector
+from langflash_core.geometry.rotations import turn_of
 from langflash_core.level import found_world
 from langflash_core.scene.file import load
-from langflash_core.scene.world import turn_of
 from tests.app.window.scenes import after, shown_scene, told
 
 LEAN = 20.0  # degrees by which the first photo looks down

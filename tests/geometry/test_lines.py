@@ -3,7 +3,7 @@
 import cv2
 import numpy as np
 
-from langflash_core.images.lines import line_segments
+from langflash_core.geometry.lines import line_segments
 
 
 def test_the_sides_of_a_rectangle_are_found_where_they_are():
