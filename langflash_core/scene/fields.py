@@ -106,10 +106,3 @@ def from_fields(
         gaussians, semantics, fields["viewmats"], fields["Ks"], view_size, jpegs, view_ids, record,
         fields.get(_LEVELS), confidences,
     )  # fmt: skip
-
-
-def field_bytes(scene: Scene) -> dict[str, int]:
-    """Stored bytes by field, photos together."""
-    sizes = {name: values.numel() * values.element_size() for name, values in to_fields(scene).items()}
-    named = {name: size for name, size in sizes.items() if name in (*REQUIRED, *_OPTIONAL)}
-    return {**named, "photos": sum(sizes.values()) - sum(named.values())}
