@@ -14,7 +14,12 @@ pixel layer i has alpha A_i and depth z_i, and is supported by all that lie abou
 
 b in sum 1: layers that agree are blended, of others the best supported shows, and a hole in one is filled by
 the next. (With the square two real films gain .06 dB and show things twice, with the eighth power they lose
-.1.) The same numbers blend everything, F = sum_i b_i F_i of colours, depths, alphas and weight maps, so what
+.1.) Where a layer ends its alpha falls, and so would sum_i b_i A_i though another is opaque there, a dark
+line along every edge: b is raised until that sum is
+
+    max_i A_i min(1, WHOLE b_i).
+
+The same numbers blend everything, F = sum_i b_i F_i of colours, depths, alphas and weight maps, so what
 is linear in a layer stays linear: W = sum_i b_i W_i, and the feature of a pixel is W D.
 
 Sizes: V views, L layers of a picture, H W pixels.
@@ -41,6 +46,11 @@ DEPTH = 0.1
 films change by .1 dB and .01 in structure."""
 
 
+WHOLE = 4.0
+"""A picture lets no more through than a layer that counts a quarter of it, and one that comes or goes changes
+nothing at once."""
+
+
 def some_layers(scene: Scene, most: int) -> Scene:
     """A scene of layers with at most so many of them, all over the walk; with one or none, a scene without
     layers."""
@@ -55,7 +65,7 @@ def some_layers(scene: Scene, most: int) -> Scene:
 def shares(
     alphas: Float[Tensor, "L H W"], depths: Float[Tensor, "L H W"], weights: Float[np.ndarray, " L"]
 ) -> Float[Tensor, "L H W"]:
-    """What each layer counts in each pixel, in sum 1; 0 where no layer shows anything.
+    """What each layer counts in each pixel, in sum 1 or more; 0 where no layer shows anything.
 
     Args:
         alphas: in [0, 1]. depths: z, scene units, anything where alpha is 0. weights: of the layers.
@@ -66,7 +76,9 @@ def shares(
     support = alphas * support
     best = support.amax(0).clamp_min(1e-30)
     blend = counts * (support / best).square().square()
-    return blend / blend.sum(0).clamp_min(1e-30)
+    blend = blend / blend.sum(0).clamp_min(1e-30)
+    shown = (blend * alphas).sum(0).clamp_min(1e-30)
+    return blend * ((alphas * (WHOLE * blend).clamp_max(1)).amax(0) / shown).clamp_min(1)
 
 
 def blend_layers(frames: Sequence[Frame], weights: Float[np.ndarray, " L"]) -> Frame:

@@ -1,7 +1,8 @@
 #version 330 core
 // Purpose: one picture of those of LAYERS layers of a scene: colour, depth, and what each layer counts in the pixel.
 // Source: langflash_core/splat/compose.py: S_i = A_i sum_j w_j A_j exp(-(ln(z_i / z_j) / DEPTH)^2) supports layer i, and
-//         b_i ~ w_i A_i (S_i / max S)^4, in sum 1. DEPTH and ALPHA_MIN are set by the program.
+//         b_i ~ w_i A_i (S_i / max S)^4, in sum 1, raised until sum_i b_i A_i is
+//         max_i A_i min(1, WHOLE b_i). DEPTH, WHOLE and ALPHA_MIN are set by the program.
 // Frames: texel = pixel.
 
 uniform sampler2D colour_0, colour_1, colour_2, colour_3;  // premultiplied
@@ -64,10 +65,18 @@ void main() {
         shares[i] = counts[i] * ratio * ratio;
         sum += shares[i];
     }
+    float closed = 0.0;
+    float shown = 0.0;
+    for (int i = 0; i < LAYERS; ++i) {
+        shares[i] /= max(sum, 1e-30);
+        closed = max(closed, depths[i].y * min(1.0, WHOLE * shares[i]));
+        shown += shares[i] * depths[i].y;
+    }
+    float raised = max(closed / max(shown, 1e-30), 1.0);
     out_colour = vec4(0.0);
     vec2 depth = vec2(0.0);
     for (int i = 0; i < LAYERS; ++i) {
-        shares[i] /= max(sum, 1e-30);
+        shares[i] *= raised;
         out_colour += shares[i] * colours[i];
         depth += shares[i] * depths[i];
     }

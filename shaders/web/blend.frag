@@ -2,7 +2,8 @@
 // Purpose: one picture of those of PARTS layers of a scene: colours, and LAYERS times three numbers. OVER: each over the
 //         next one, for moving pictures; else blended, as splat/blend.frag has it.
 // Source: langflash_core/splat/compose.py: S_i = A_i sum_j w_j A_j exp(-(ln(z_i / z_j) / DEPTH)^2) supports layer i, and
-//         b_i ~ w_i A_i (S_i / max S)^4, in sum 1. DEPTH is set by the page.
+//         b_i ~ w_i A_i (S_i / max S)^4, in sum 1, raised until sum_i b_i A_i is
+//         max_i A_i min(1, WHOLE b_i). DEPTH, WHOLE is set by the page.
 // Frames: texel = pixel. Depth is of the mean place that a picture shows, as that of its Gaussians is.
 
 precision highp float;
@@ -62,7 +63,14 @@ void share() {
         shares[i] = parts[i].x * alphas[i] * ratio * ratio;
         sum += shares[i];
     }
-    for (int i = 0; i < PARTS; ++i) shares[i] /= max(sum, 1e-30);
+    float closed = 0.0;
+    float shown = 0.0;
+    for (int i = 0; i < PARTS; ++i) {
+        shares[i] /= max(sum, 1e-30);
+        closed = max(closed, alphas[i] * min(1.0, WHOLE * shares[i]));
+        shown += shares[i] * alphas[i];
+    }
+    for (int i = 0; i < PARTS; ++i) shares[i] *= max(closed / max(shown, 1e-30), 1.0);
 #endif
 }
 

@@ -161,7 +161,13 @@ def test_a_page_holds_the_layers_that_lie_all_over_the_walk(tmp_path):
 def test_the_page_blends_by_our_numbers():
     text = "".join((PAGE / f"{name}.js").read_text(encoding="utf-8") for name in ("layers", "blending"))
     said = {name: float(value) for name, value in re.findall(r"const (\w+) = ([\d.e-]+);", text)}
-    ours = {"NEAREST": NEAREST, "FLOOR": FLOOR, "DEPTH": compose.DEPTH, "MOVING": MOVING}
+    ours = {
+        "NEAREST": NEAREST,
+        "FLOOR": FLOOR,
+        "DEPTH": compose.DEPTH,
+        "WHOLE": compose.WHOLE,
+        "MOVING": MOVING,
+    }
     assert {name: said[name] for name in ours} == ours
     assert f"PLACE_STEPS = {list(COLUMNS.place_steps)};" in text
 

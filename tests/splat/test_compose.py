@@ -102,19 +102,41 @@ def test_a_hole_is_filled_by_the_next_layer():
     )
 
 
+@pytest.mark.parametrize("alpha", [0.05, 0.5, 0.8, 0.95])
+def test_where_a_layer_ends_before_an_opaque_one_no_light_passes(alpha):
+    """An edge of the nearer photo's layer: its alpha falls to 0 over a pixel, in front of a wall of one colour."""
+    near, far = frame(0.6, alpha, 3.0), frame(0.6, 1, 3.0)
+    blend = compose.blend_layers([near, far], np.array([0.6, 0.4]))
+    assert torch.allclose(blend.alphas, torch.ones(2, 3)) and torch.allclose(blend.rgb, torch.tensor(0.6))
+
+
+def test_an_opaque_layer_that_goes_changes_nothing_at_once():
+    frames = [frame(0.2, 0.5, 3.0), frame(0.9, 1, 3.0)]
+    alphas = [
+        float(compose.blend_layers(frames, np.array([1 - w, w])).alphas[0, 0])
+        for w in np.linspace(0, 0.4, 401)
+    ]
+    # beside a layer of (1 / 2)^4 / 2 one of weight w counts 32 w at most, and closes WHOLE times that
+    assert alphas[0] == 0.5 and alphas[-1] == 1
+    assert np.diff(alphas).min() >= -1e-6 and np.diff(alphas).max() < compose.WHOLE * 32 * 0.001
+
+
 def test_where_no_layer_shows_anything_nothing_is_shown():
     blend = compose.blend_layers([frame(0.2, 0, 0), frame(0.9, 0, 0)], np.array([0.5, 0.5]))
     assert not blend.rgb.any() and not blend.alphas.any() and not blend.depths.any()
 
 
-def test_shares_are_in_sum_one_and_never_no_numbers():
+def test_shares_are_in_sum_one_or_raised_to_what_a_layer_shows_and_never_no_numbers():
     torch.manual_seed(0)
     alphas = torch.rand(4, 5, 6) * (torch.rand(4, 5, 6) > 0.5)
     depths = torch.rand(4, 5, 6) * 10 ** torch.randint(-6, 6, (4, 5, 6)).float()
     b = compose.shares(alphas, depths, np.array([0.4, 0.3, 0.2, 0.1]))
     there = alphas.amax(0) > 0
     assert torch.isfinite(b).all() and (b >= 0).all()
-    assert torch.allclose(b.sum(0)[there], torch.ones(int(there.sum())), atol=1e-5)
+    shown = (b * alphas).sum(0)
+    assert (b.sum(0)[there] > 1 - 1e-5).all() and (shown <= alphas.amax(0) + 1e-5).all()
+    kept = (alphas * (compose.WHOLE * b / b.sum(0).clamp_min(1e-30)).clamp_max(1)).amax(0)
+    assert torch.allclose(shown, torch.maximum(kept, shown / b.sum(0).clamp_min(1)), atol=1e-5)
 
 
 def test_weight_maps_are_blended_with_the_same_numbers():
