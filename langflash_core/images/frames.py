@@ -195,7 +195,8 @@ class _Watch:
         if self._lost > self._looked / 2 and kept < self._looked / 4:
             raise _bare(film.name)
         until = film.seconds if end is None else min(end, film.seconds)  # 0: the film does not say
-        early = bool(until) and last < 0.9 * until - 0.5
+        shown = (last - (first or 0.0)) / max(self._looked - 1, 1)  # seconds of a picture, the last one's too
+        early = bool(until) and last + shown < 0.9 * until - 0.5
         return Strip(
             film.name,
             self._folder,

@@ -204,6 +204,12 @@ def test_a_strip_is_as_long_as_its_film_says(tmp_path: Path) -> None:
     assert strip_of(path, start=0.5, end=1.5).seconds == 1.0
 
 
+def test_a_film_of_a_picture_a_second_ends_where_its_last_one_does(tmp_path: Path) -> None:
+    path = films.write(tmp_path / "walk.mp4", films.walk(20)[::10], 1)
+    strip = strip_of(path)
+    assert strip.seconds == 2.0 and not strip.notes
+
+
 def test_a_film_that_ends_too_early_says_so(tmp_path: Path) -> None:
     path = films.write(tmp_path / "walk.mp4", films.walk(60), films.RATE, "-movflags", "+faststart")
     content = path.read_bytes()
