@@ -7,7 +7,7 @@ import moderngl
 import numpy as np
 
 from langflash_core.geometry.nearness import NEAREST
-from langflash_core.splat.compose import DEPTH, WHOLE
+from langflash_core.splat.compose import CLOSES, DEPTH
 from langflash_core.splat.projection import ALPHA_MIN
 
 from .colour import draw_colour
@@ -57,7 +57,12 @@ class Blend:
             textures |= {f"colour_{place}": layer.colour, f"depth_{place}": layer.depth}
         weights = tuple(float(w) for w in np.pad(level.weights, (0, NEAREST - len(level.weights))))
         uniforms = {"weights": weights, "halved": level.halved}
-        defines = {"LAYERS": _FEW if few else NEAREST, "DEPTH": DEPTH, "WHOLE": WHOLE, "ALPHA_MIN": ALPHA_MIN}
+        defines = {
+            "LAYERS": _FEW if few else NEAREST,
+            "DEPTH": DEPTH,
+            "CLOSES": CLOSES,
+            "ALPHA_MIN": ALPHA_MIN,
+        }
         self._painter.fill(self._target, "blend.frag", textures, uniforms, defines)
         self._painter.passes["blend"] += 1
         if into is not None:

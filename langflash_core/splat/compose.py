@@ -17,7 +17,7 @@ the next. (With the square two real films gain .06 dB and show things twice, wit
 .1.) Where a layer ends its alpha falls, and so would sum_i b_i A_i though another is opaque there, a dark
 line along every edge: b is raised until that sum is
 
-    max_i A_i min(1, WHOLE b_i).
+    max_i A_i min(1, w_i A_i / (CLOSES sum_j w_j A_j)).
 
 The same numbers blend everything, F = sum_i b_i F_i of colours, depths, alphas and weight maps, so what
 is linear in a layer stays linear: W = sum_i b_i W_i, and the feature of a pixel is W D.
@@ -46,9 +46,9 @@ DEPTH = 0.1
 films change by .1 dB and .01 in structure."""
 
 
-WHOLE = 4.0
-"""A picture lets no more through than a layer that counts a quarter of it, and one that comes or goes changes
-nothing at once."""
+CLOSES = 0.005
+"""Share of w_i A_i from which a layer lets no light through where it is opaque itself: at a photo's place the
+next one has some .015, the third of a close film .003. One that comes or goes changes nothing at once."""
 
 
 def some_layers(scene: Scene, most: int) -> Scene:
@@ -77,8 +77,8 @@ def shares(
     best = support.amax(0).clamp_min(1e-30)
     blend = counts * (support / best).square().square()
     blend = blend / blend.sum(0).clamp_min(1e-30)
-    shown = (blend * alphas).sum(0).clamp_min(1e-30)
-    return blend * ((alphas * (WHOLE * blend).clamp_max(1)).amax(0) / shown).clamp_min(1)
+    closed = (alphas * (counts / (CLOSES * counts.sum(0)).clamp_min(1e-30)).clamp_max(1)).amax(0)
+    return blend * (closed / (blend * alphas).sum(0).clamp_min(1e-30)).clamp_min(1)
 
 
 def blend_layers(frames: Sequence[Frame], weights: Float[np.ndarray, " L"]) -> Frame:

@@ -2,7 +2,7 @@
 // Purpose: one picture of those of LAYERS layers of a scene: colour, depth, and what each layer counts in the pixel.
 // Source: langflash_core/splat/compose.py: S_i = A_i sum_j w_j A_j exp(-(ln(z_i / z_j) / DEPTH)^2) supports layer i, and
 //         b_i ~ w_i A_i (S_i / max S)^4, in sum 1, raised until sum_i b_i A_i is
-//         max_i A_i min(1, WHOLE b_i). DEPTH, WHOLE and ALPHA_MIN are set by the program.
+//         max_i A_i min(1, w_i A_i / (CLOSES sum_j w_j A_j)). DEPTH, CLOSES and ALPHA_MIN are set by the program.
 // Frames: texel = pixel.
 
 uniform sampler2D colour_0, colour_1, colour_2, colour_3;  // premultiplied
@@ -57,6 +57,7 @@ void main() {
         best = max(best, support[i]);
     }
     float sum = 0.0;
+    float all = 0.0;
     float shares[4];
     for (int i = 0; i < 4; ++i) shares[i] = 0.0;
     for (int i = 0; i < LAYERS; ++i) {
@@ -64,12 +65,13 @@ void main() {
         ratio *= ratio;
         shares[i] = counts[i] * ratio * ratio;
         sum += shares[i];
+        all += counts[i];
     }
     float closed = 0.0;
     float shown = 0.0;
     for (int i = 0; i < LAYERS; ++i) {
         shares[i] /= max(sum, 1e-30);
-        closed = max(closed, depths[i].y * min(1.0, WHOLE * shares[i]));
+        closed = max(closed, depths[i].y * min(1.0, counts[i] / max(CLOSES * all, 1e-30)));
         shown += shares[i] * depths[i].y;
     }
     float raised = max(closed / max(shown, 1e-30), 1.0);

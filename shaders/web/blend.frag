@@ -3,7 +3,7 @@
 //         next one, for moving pictures; else blended, as splat/blend.frag has it.
 // Source: langflash_core/splat/compose.py: S_i = A_i sum_j w_j A_j exp(-(ln(z_i / z_j) / DEPTH)^2) supports layer i, and
 //         b_i ~ w_i A_i (S_i / max S)^4, in sum 1, raised until sum_i b_i A_i is
-//         max_i A_i min(1, WHOLE b_i). DEPTH, WHOLE is set by the page.
+//         max_i A_i min(1, w_i A_i / (CLOSES sum_j w_j A_j)). DEPTH, CLOSES is set by the page.
 // Frames: texel = pixel. Depth is of the mean place that a picture shows, as that of its Gaussians is.
 
 precision highp float;
@@ -57,17 +57,19 @@ void share() {
         best = max(best, support[i]);
     }
     float sum = 0.0;
+    float all = 0.0;
     for (int i = 0; i < PARTS; ++i) {
         float ratio = support[i] / best;
         ratio *= ratio;
         shares[i] = parts[i].x * alphas[i] * ratio * ratio;
         sum += shares[i];
+        all += parts[i].x * alphas[i];
     }
     float closed = 0.0;
     float shown = 0.0;
     for (int i = 0; i < PARTS; ++i) {
         shares[i] /= max(sum, 1e-30);
-        closed = max(closed, alphas[i] * min(1.0, WHOLE * shares[i]));
+        closed = max(closed, alphas[i] * min(1.0, parts[i].x * alphas[i] / max(CLOSES * all, 1e-30)));
         shown += shares[i] * alphas[i];
     }
     for (int i = 0; i < PARTS; ++i) shares[i] *= max(closed / max(shown, 1e-30), 1.0);

@@ -165,7 +165,7 @@ def test_the_page_blends_by_our_numbers():
         "NEAREST": NEAREST,
         "FLOOR": FLOOR,
         "DEPTH": compose.DEPTH,
-        "WHOLE": compose.WHOLE,
+        "CLOSES": compose.CLOSES,
         "MOVING": MOVING,
     }
     assert {name: said[name] for name in ours} == ours

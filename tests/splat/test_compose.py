@@ -102,11 +102,12 @@ def test_a_hole_is_filled_by_the_next_layer():
     )
 
 
+@pytest.mark.parametrize("weight", [0.015, 0.4])
 @pytest.mark.parametrize("alpha", [0.05, 0.5, 0.8, 0.95])
-def test_where_a_layer_ends_before_an_opaque_one_no_light_passes(alpha):
-    """An edge of the nearer photo's layer: its alpha falls to 0 over a pixel, in front of a wall of one colour."""
+def test_where_a_layer_ends_before_an_opaque_one_no_light_passes(alpha, weight):
+    """An edge of the nearer photo's layer: its alpha falls to 0 over a pixel, before a wall as bright."""
     near, far = frame(0.6, alpha, 3.0), frame(0.6, 1, 3.0)
-    blend = compose.blend_layers([near, far], np.array([0.6, 0.4]))
+    blend = compose.blend_layers([near, far], np.array([1 - weight, weight]))
     assert torch.allclose(blend.alphas, torch.ones(2, 3)) and torch.allclose(blend.rgb, torch.tensor(0.6))
 
 
@@ -114,11 +115,11 @@ def test_an_opaque_layer_that_goes_changes_nothing_at_once():
     frames = [frame(0.2, 0.5, 3.0), frame(0.9, 1, 3.0)]
     alphas = [
         float(compose.blend_layers(frames, np.array([1 - w, w])).alphas[0, 0])
-        for w in np.linspace(0, 0.4, 401)
+        for w in np.linspace(0, 0.004, 401)
     ]
-    # beside a layer of (1 / 2)^4 / 2 one of weight w counts 32 w at most, and closes WHOLE times that
-    assert alphas[0] == 0.5 and alphas[-1] == 1
-    assert np.diff(alphas).min() >= -1e-6 and np.diff(alphas).max() < compose.WHOLE * 32 * 0.001
+    assert alphas[0] == 0.5 and alphas[-1] == pytest.approx(1)
+    steps = np.diff(alphas)  # w A is about 2 w of all
+    assert steps.min() >= -1e-6 and steps.max() <= 2.1e-4 / compose.CLOSES
 
 
 def test_where_no_layer_shows_anything_nothing_is_shown():
@@ -135,8 +136,7 @@ def test_shares_are_in_sum_one_or_raised_to_what_a_layer_shows_and_never_no_numb
     assert torch.isfinite(b).all() and (b >= 0).all()
     shown = (b * alphas).sum(0)
     assert (b.sum(0)[there] > 1 - 1e-5).all() and (shown <= alphas.amax(0) + 1e-5).all()
-    kept = (alphas * (compose.WHOLE * b / b.sum(0).clamp_min(1e-30)).clamp_max(1)).amax(0)
-    assert torch.allclose(shown, torch.maximum(kept, shown / b.sum(0).clamp_min(1)), atol=1e-5)
+    assert (shown >= alphas.amax(0) - 0.01)[alphas.amax(0) > 0.1].all()  # nearly all count enough to close it
 
 
 def test_weight_maps_are_blended_with_the_same_numbers():

@@ -1,8 +1,8 @@
 // Pictures of scenes of layers: each layer into a picture of its own, and one of those. Twins:
-// langflash_core/splat/compose.py, whose constants DEPTH and WHOLE are, and app/gl/layered.py, whose constant MOVING is.
+// langflash_core/splat/compose.py, whose constants DEPTH and CLOSES are, and app/gl/layered.py, whose constant MOVING is.
 
 const DEPTH = 0.1; // of the logarithm of depth, at which two layers still support each other by 1 / e
-const WHOLE = 4; // a layer that counts a quarter of a picture lets no more through than it does alone
+const CLOSES = 0.005; // share from which a layer lets no light through where it is opaque itself
 const MOVING = 2; // layers of a moving picture: the nearest, and the next one where that has holes
 
 // Has what Drawing has. A target of it keeps the layers' pictures, `pictures`, as long as it is there.
@@ -115,7 +115,7 @@ class LayeredDrawing {
       ...constants,
       PARTS: parts.length,
       DEPTH,
-      WHOLE: WHOLE.toFixed(1),
+      CLOSES,
     });
     gl.bindFramebuffer(gl.FRAMEBUFFER, target.framebuffer);
     gl.drawBuffers(
