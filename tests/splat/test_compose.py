@@ -119,7 +119,7 @@ def test_an_opaque_layer_that_goes_changes_nothing_at_once():
     ]
     assert alphas[0] == 0.5 and alphas[-1] == pytest.approx(1)
     steps = np.diff(alphas)  # w A is about 2 w of all
-    assert steps.min() >= -1e-6 and steps.max() <= 2.1e-4 / compose.CLOSES
+    assert steps.min() >= -1e-6 and steps.max() <= 2.1e-5 / compose.CLOSES
 
 
 def test_where_no_layer_shows_anything_nothing_is_shown():
