@@ -13,6 +13,7 @@ Memory is bounded: a history keeps the last `MOST_EDITS` edits, and fewer where 
 import zlib
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any, Literal
 
 from langflash_core.base.records import World
@@ -69,12 +70,12 @@ class Marks:
         atoms = tuple(Atom(k) for k in range(num_atoms))
         return Marks(nothing, nothing, nothing, atoms, (num_gaussians, num_atoms))
 
-    @property
+    @cached_property
     def left(self) -> Mask:
         """Gaussians that there are and that are not deleted."""
         return Mask.first(self.deleted.count, self.there[0]) - self.deleted
 
-    @property
+    @cached_property
     def visible(self) -> Mask:
         """Gaussians that are shown."""
         return self.left - self.hidden

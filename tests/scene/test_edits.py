@@ -86,6 +86,23 @@ def test_masks_are_sets():
         _ = Mask.none(COUNT) | Mask.none(COUNT + 1)
 
 
+@pytest.mark.parametrize("count", [0, 1, 7, 8, 9, COUNT])
+@pytest.mark.parametrize("some", [0, 1, 8, 500, 2000])
+def test_the_first_rows_are_as_of_their_booleans(count: int, some: int) -> None:
+    assert Mask.first(count, some) == Mask.of(np.arange(count) < some)
+    assert Mask.full(count) == Mask.of(np.ones(count, bool)) and len(Mask.full(count)) == count
+
+
+def test_what_every_frame_asks_of_marks_unpacks_no_set(monkeypatch) -> None:
+    """Of ten million Gaussians a byte for each took a frame's thread .1 s."""
+    marks = Marks.without_edits(COUNT, ATOMS)
+    gone = delete(marks, Mask.first(COUNT, 10))
+    monkeypatch.setattr(np, "packbits", None)
+    monkeypatch.setattr(np, "unpackbits", None)
+    assert len(gone.visible) == len(gone.left) == COUNT - 10
+    assert gone.visible is gone.visible and gone.written != marks.written
+
+
 @pytest.mark.parametrize("seed", range(3))
 def test_200_random_edits_undone_give_the_first_state_bit_for_bit(seed):
     history, passed = random_history(seed, 200)

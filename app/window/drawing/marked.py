@@ -33,14 +33,18 @@ class Marked:
     @cached_property
     def shown(self) -> tuple[np.ndarray, np.ndarray]:
         """Which Gaussians are there (N,) bool, and their tints (N,) uint8 (`splats.TINTS`), 0 for none."""
-        tints = np.zeros(self.marks.selected.count, np.uint8)
-        if not isinstance(self.gesture, Recoloured):  # its colour is to be seen
-            tints[self.marks.selected.rows()] = 1
+        recoloured = isinstance(self.gesture, Recoloured)  # its colour is to be seen
+        tints = np.zeros(self.marks.selected.count, np.uint8) if recoloured else _ones(self.marks.selected)
         if self.doomed is not None:
-            tints[self.doomed.rows()] = 2
+            np.maximum(tints, 2 * _ones(self.doomed), out=tints)
         return self.marks.visible.rows(), tints
 
     @cached_property
     def edited(self) -> "Scene":
         """All Gaussians, moved and recoloured."""
         return self.memory.changed(self.marks, self.gesture)
+
+
+def _ones(mask: Mask) -> np.ndarray:
+    """(N,) uint8, 1 for those of a set."""
+    return mask.rows().view(np.uint8)

@@ -35,6 +35,7 @@ TURN_STEP = 5.0  # degrees
 SCALE_STEP = 1.05
 FARTHEST = 1e4  # scene units that one gesture moves
 _OUTLIERS = (0.02, 0.98)
+_ENOUGH = 100_000  # Gaussians, of which a selection's middle and brightness are taken within a frame
 
 
 @dataclass(frozen=True)
@@ -152,7 +153,7 @@ def pivot_of(info: SceneInfo, marks: Marks) -> Spot | None:
     """The middle of the box around nearly all that is selected; None where nothing is."""
 
     def middle() -> Spot | None:
-        points = info.memory.changed(marks).gaussians.means.double().numpy()[marks.selected.rows()]
+        points = info.memory.changed(marks).gaussians.means.numpy()[_some(marks)].astype(np.float64)
         points = points[np.isfinite(points).all(1)]
         return _spot(np.quantile(points, _OUTLIERS, axis=0).mean(0)) if len(points) else None
 
@@ -167,10 +168,15 @@ def luma_of(info: SceneInfo, marks: Marks) -> float:
 
         from langflash_core.scene.changed import mean_luma
 
-        rows = torch.from_numpy(marks.selected.rows())
-        return mean_luma(info.memory.changed(marks).gaussians, rows)
+        return mean_luma(info.memory.changed(marks).gaussians, torch.from_numpy(_some(marks)))
 
     return info.memory.answered("luma", (marks.selected, marks.changes), mean)
+
+
+def _some(marks: Marks) -> np.ndarray:
+    """Rows of what is selected, evenly, about `_ENOUGH` of more: a frame waits for what is asked of them."""
+    rows = np.flatnonzero(marks.selected.rows())
+    return rows[:: max(1, len(rows) // _ENOUGH)]
 
 
 # A gesture as the matrix that a gizmo turns, and as the numbers of a field

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass, field, replace
 from enum import Enum
+from functools import cached_property
 from pathlib import Path
 
 import numpy as np
@@ -185,10 +186,15 @@ class Floaters:
         for limit in (self.within, self.answering):
             scope = scope if limit is None else scope & limit
         if self.strength:
-            found = Mask.of(np.frombuffer(self.least, np.float32) <= self.strength)
+            found = self._weak
         found = scope & (found if self.ruled is None else found | self.ruled)
         found = scope - found if self.recipe.invert else found
         return found if self.outside is None else found | (visible & self.outside)
+
+    @cached_property
+    def _weak(self) -> Mask:
+        """What goes by its strength alone; every frame of the preview asks."""
+        return _up_to(self.least, self.strength)
 
 
 @dataclass(frozen=True)
@@ -207,9 +213,17 @@ class Hiding:
     def mask(self, marks: Marks) -> Mask | None:
         """Gaussians that are hidden, as `langflash_core.mending.hiding.hide` finds them; None: not known
         yet."""
-        if self.of != marks:
-            return None
-        return Mask.of(np.frombuffer(self.least, np.float32) <= self.margin)
+        return self._near if self.of == marks else None
+
+    @cached_property
+    def _near(self) -> Mask:
+        """What the margin hides; every frame of the preview asks."""
+        return _up_to(self.least, self.margin)
+
+
+def _up_to(least: bytes, most: float) -> Mask:
+    """Gaussians whose number, of (N,) float32 bytes, is not above the most."""
+    return Mask.of(np.frombuffer(least, np.float32) <= most)
 
 
 @dataclass(frozen=True)

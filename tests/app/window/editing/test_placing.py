@@ -20,6 +20,7 @@ from app.window.editing.things import ThingFound
 from app.window.editing.work import FindThing
 from app.window.frame import table
 from app.window.scene import commands as show
+from app.window.scene.memory import SceneMemory
 from app.window.scene.work import describe_scene
 from app.window.state import State
 from langflash_core.geometry import poses
@@ -124,6 +125,18 @@ def test_a_step_of_a_key_is_as_far_by_parallel_rays(chosen: State) -> None:
     flat = means(after(chosen.with_scene(pose=far), Nudge(right=1))) - means(chosen)
     plain = means(after(chosen, Nudge(right=1))) - means(chosen)
     np.testing.assert_allclose(flat, plain, atol=1e-6)  # float32 places
+
+
+def test_some_of_a_large_selection_tell_its_middle_and_its_brightness(chosen: State, monkeypatch) -> None:
+    info, marks = chosen.scene.info, chosen.editing.marks
+    assert info is not None and marks is not None
+    pivot, luma = placing.pivot_of(info, marks), placing.luma_of(info, marks)
+    monkeypatch.setattr(placing, "_ENOUGH", 400)
+    info = replace(info, memory=SceneMemory(info.scene))  # which has answered nothing
+    some = placing.pivot_of(info, marks)
+    assert pivot is not None and some is not None
+    np.testing.assert_allclose(some, pivot, atol=0.05)  # of a block .6 wide
+    assert abs(placing.luma_of(info, marks) - luma) < 0.05
 
 
 def test_a_number_that_is_none_moves_nothing(chosen: State) -> None:
