@@ -4,22 +4,29 @@ wrong with a file is told at once. The format is described in `file.py`.
 
 import hashlib
 import json
+import math
 import os
 import struct
 from collections.abc import Mapping
 from dataclasses import dataclass
+from io import BufferedReader
 from pathlib import Path
 
 import numpy as np
 import safetensors.numpy
 from jaxtyping import Shaped
-from safetensors import SafetensorError
 
 from langflash_core.base.files import write_atomically
 from langflash_core.base.limits import ATOMS, GAUSSIANS, HEADER, VIEWS
 from langflash_core.errors import SceneFileError
 
 FORMAT, VERSION = "langflash-scene", 3
+_TYPES = {
+    **{f"{kind}{8 * size}": f"<{kind.lower()}{size}" for kind in "IU" for size in (1, 2, 4, 8)},
+    **{f"F{8 * size}": f"<f{size}" for size in (2, 4, 8)},
+    "BOOL": "?",
+}
+"""What safetensors calls the types of numbers, as numpy does."""
 _REMEDY = "reconstruct the scene again or copy the whole file"
 _FOREIGN = {
     b"\xff\xd8\xff": "a JPEG photo",
@@ -49,10 +56,10 @@ def read_container(path: Path) -> Container:
         SceneFileError: missing, truncated, damaged, foreign, or of a newer version; says what was
             expected and what was found.
     """
-    header, content = _read_file(path)
+    header, arrays = _read_file(path)
     version = _version(path, header)
     try:
-        arrays, text = safetensors.numpy.load(content), header["scene"]
+        text = header["scene"]
         if digest(text, arrays) != header["digest"]:
             raise ValueError("its content does not match its checksum")
         described = json.loads(text)
@@ -60,7 +67,7 @@ def read_container(path: Path) -> Container:
         return Container(
             version, str(described["space"]), (width, height), dict(described["metadata"]), arrays
         )
-    except (SafetensorError, ValueError, LookupError, TypeError, RuntimeError, ArithmeticError) as error:
+    except (ValueError, LookupError, TypeError, RuntimeError, ArithmeticError) as error:
         raise damage_error(path, error) from error
 
 
@@ -107,12 +114,12 @@ def digest(text: str, arrays: Mapping[str, Shaped[np.ndarray, "..."]]) -> str:
     for name in sorted(arrays):
         values = arrays[name]
         total.update(f"{name} torch.{values.dtype} {tuple(values.shape)}\n".encode())
-        total.update(values.tobytes())
+        total.update(_bytes_of(np.ascontiguousarray(values)))
     return total.hexdigest()
 
 
-def _read_file(path: Path, whole: bool = True) -> tuple[dict[str, str], bytes]:
-    """The `__metadata__` strings and the whole file, or its header, after its size was found right."""
+def _read_file(path: Path, whole: bool = True) -> tuple[dict[str, str], dict[str, Shaped[np.ndarray, "..."]]]:
+    """The `__metadata__` strings and, of the whole file, the tensors, after its size was found right."""
     if path.is_dir():
         raise SceneFileError(f"{path} is a folder; name a scene file (.langflash)")
     try:
@@ -126,12 +133,37 @@ def _read_file(path: Path, whole: bool = True) -> tuple[dict[str, str], bytes]:
             header = _parse_header(path, start + head[:8], head)
             _check_counts(path, header)
             _check_size(path, 8 + length, header, size)
-            return header["__metadata__"], start + head + (stream.read() if whole else b"")
+            return header.pop("__metadata__"), _read_arrays(path, stream, header) if whole else {}
     except FileNotFoundError as error:
         remedy = "check the path, or make it with: langflash reconstruct"
         raise SceneFileError(f"scene {path} does not exist; {remedy}") from error
     except OSError as error:
         raise SceneFileError(f"{path} cannot be read ({error.strerror}); check its permissions") from error
+
+
+def _read_arrays(
+    path: Path, stream: BufferedReader, entries: dict[str, dict]
+) -> dict[str, Shaped[np.ndarray, "..."]]:
+    """The tensors, each into memory of its own while other threads go on: safetensors copies all of them
+    under Python's lock, for which frames wait."""
+    arrays, end = {}, 0
+    try:
+        for name, entry in sorted(entries.items(), key=lambda pair: pair[1]["data_offsets"]):
+            start, stop = (int(offset) for offset in entry["data_offsets"])
+            shape, kind = tuple(int(side) for side in entry["shape"]), np.dtype(_TYPES[entry["dtype"]])
+            if start != end or min(shape, default=0) < 0 or stop - start != kind.itemsize * math.prod(shape):
+                raise ValueError(f"the bytes of {name} are not those of {entry['dtype']} {shape}")
+            arrays[name] = np.empty(shape, kind)
+            stream.readinto(_bytes_of(arrays[name]))
+            end = stop
+    except (ValueError, LookupError, TypeError, ArithmeticError) as error:
+        raise damage_error(path, error) from error
+    return arrays
+
+
+def _bytes_of(values: Shaped[np.ndarray, "..."]) -> memoryview:
+    """Those of a contiguous array themselves, no copy."""
+    return values.reshape(-1).view(np.uint8).data
 
 
 def _parse_header(path: Path, first: bytes, head: bytes) -> dict:
