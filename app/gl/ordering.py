@@ -13,7 +13,8 @@ from functools import cache
 import numpy as np
 from torch import Tensor
 
-from langflash_core.splat.projection import ALPHA_MIN, DILATION, NEAR, TAN_MARGIN
+from langflash_core.splat.frustum import AT_ONCE, near_frustum, steepness
+from langflash_core.splat.projection import ALPHA_MIN, DILATION, NEAR
 from langflash_core.types import Camera
 
 MOST_BEHIND = 2
@@ -23,7 +24,6 @@ MARGIN = 0.1
 5 degrees: two frames of a turn by 75 degrees a second at 30 frames a second."""
 FEW = 50_000
 """Gaussians that are ordered within 4 ms, which is not worth a late order."""
-_AT_ONCE = 1 << 16  # Gaussians: their 2 MB of numbers stay in a core's cache
 _MOST_THREADS = 4  # as many as layers are blended
 
 
@@ -225,47 +225,13 @@ def sees(before: Camera, now: Camera, depths: tuple[float, float], margin: float
 
 def _around(places: Places, camera: Camera, margin: float) -> tuple[np.ndarray, np.ndarray]:
     """Rows (n,) uint32, ascending, that may touch the image or so many of its sides around it, and their
-    depths (n,) float32.
-
-    Beside each side of the frustum, with sqrt(a^2 + b^2) <= a + b for the radius in pixels: f x + (c + r) z
-    + b s > 0 of the left one, linear in place and largest scale s, so one product of matrices tells.
-    """
-    viewmat, _ = _matrices(camera)
-    planes = _planes(camera, margin)
-    eye = -viewmat[:3, :3].T @ viewmat[:3, 3]
-    centre = eye.astype(np.float32)[:, None]
-    turned = (planes[:, :3] @ viewmat[:3, :3]).astype(np.float32)  # (5, 3)
-    rest = planes[:, 3] + planes[:, :3] @ viewmat[:3, :3] @ (centre[:, 0] - eye)
-    rest, widths = rest.astype(np.float32)[:, None], planes[:4, 4].astype(np.float32)[:, None]
+    depths (n,) float32."""
     rows, depths = [np.zeros(0, np.uint32)], [np.zeros(0, np.float32)]
-    for first in range(0, len(places.widest), _AT_ONCE):
-        some = slice(first, first + _AT_ONCE)
-        with np.errstate(over="ignore", invalid="ignore"):  # as below
-            beside = turned @ (places.means[:, some] - centre)  # (5, n), the last one z
-            beside += rest
-            z = beside[4]
-            beside[:4] += widths * places.widest[some]
-            found = np.flatnonzero((beside[:4].min(0) > 0) & (z >= NEAR) & places.shown[some])
-        rows.append((found + first).astype(np.uint32))
+    for some, inside, z in near_frustum(places.means, places.widest, camera, margin=margin):
+        found = np.flatnonzero(inside & places.shown[some])
+        rows.append((found + some.start).astype(np.uint32))
         depths.append(z[found])
     return np.concatenate(rows), np.concatenate(depths)
-
-
-def _planes(camera: Camera, margin: float) -> np.ndarray:
-    """(5, 5) numbers that x y z 1 in the camera's axes and the largest scale are multiplied by: distances
-    from the left, right, upper and lower side, pixels times z, and z."""
-    _, K = _matrices(camera)
-    flat = camera.orthographic
-    faint = math.sqrt(2 * math.log(1 / ALPHA_MIN))
-    found = np.zeros((5, 5))
-    found[4, 2] = 1
-    found[:4, 4] = faint * math.sqrt(_steepness(camera))
-    for axis, extent in enumerate((camera.width, camera.height)):
-        radius = faint * math.sqrt(DILATION) + 1 + margin * extent
-        found[2 * axis : 2 * axis + 2, axis] = K[axis, axis], -K[axis, axis]
-        found[2 * axis, 3 if flat else 2] = K[axis, 2] + radius
-        found[2 * axis + 1, 3 if flat else 2] = extent - K[axis, 2] + radius
-    return found
 
 
 def _chosen(places: Places, camera: Camera) -> tuple[np.ndarray, np.ndarray]:
@@ -273,8 +239,8 @@ def _chosen(places: Places, camera: Camera) -> tuple[np.ndarray, np.ndarray]:
     viewmat, _ = _matrices(camera)
     row = viewmat[2]
     rows, depths = [np.zeros(0, np.uint32)], [np.zeros(0)]
-    for first in range(0, len(places.widest), _AT_ONCE):
-        some = slice(first, first + _AT_ONCE)
+    for first in range(0, len(places.widest), AT_ONCE):
+        some = slice(first, first + AT_ONCE)
         across, down, along = places.means[:, some].astype(np.float64)
         z = across * row[0] + down * row[1] + along * row[2] + row[3]
         with np.errstate(over="ignore", invalid="ignore"):  # places beyond float32 are beside any image
@@ -285,18 +251,6 @@ def _chosen(places: Places, camera: Camera) -> tuple[np.ndarray, np.ndarray]:
     return np.concatenate(rows), np.concatenate(depths)
 
 
-def _steepness(camera: Camera) -> float:
-    """Bound of |J|_F^2 z^2: the sum over both axes of focal^2 (1 + steepest slope^2). Of an orthographic
-    camera |J|_F^2 = fx^2 + fy^2, wherever the Gaussian is."""
-    _, K = _matrices(camera)
-    bound = 0.0
-    for axis, extent in enumerate((camera.width, camera.height)):
-        focal, principal = K[axis, axis], K[axis, 2]
-        steepest = (max(principal, extent - principal) + TAN_MARGIN * 0.5 * extent) / focal
-        bound += focal * focal * (1 if camera.orthographic else 1 + steepest * steepest)
-    return bound
-
-
 def _may_touch(means: np.ndarray, widest: np.ndarray, z: np.ndarray, camera: Camera) -> np.ndarray:
     """(n,) bool, conservative: the Frobenius norm of the Jacobian bounds the footprint."""
     viewmat, K = _matrices(camera)
@@ -305,7 +259,7 @@ def _may_touch(means: np.ndarray, widest: np.ndarray, z: np.ndarray, camera: Cam
     inverse = np.ones(len(z), np.float32) if flat else 1 / np.where(seen, z, 1.0).astype(np.float32)
     rounding = np.float32(1e-6 * np.abs(viewmat[:3, 3]).max())  # of places far from the origin
     deviations = np.sqrt(
-        np.square((widest + rounding) * inverse) * np.float32(_steepness(camera)) + np.float32(DILATION)
+        np.square((widest + rounding) * inverse) * np.float32(steepness(camera)) + np.float32(DILATION)
     )
     radius = np.float32(math.sqrt(2 * math.log(1 / ALPHA_MIN))) * deviations + np.float32(1)
     for axis, extent in enumerate((camera.width, camera.height)):

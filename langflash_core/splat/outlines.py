@@ -17,6 +17,7 @@ from langflash_core.geometry.pinhole import see
 from langflash_core.splat.settings import OUTLINES
 from langflash_core.types import Camera, Scene
 
+from .frustum import may_touch
 from .projection import NEAR
 
 
@@ -43,10 +44,10 @@ def silhouette(
     scene: Scene, visible: Bool[np.ndarray, " N"], part: Bool[np.ndarray, " N"], camera: Camera
 ) -> Bool[np.ndarray, "H W"]:
     """The camera's pixels (H, W) that show a part."""
-    rows = np.flatnonzero(visible & _drawn_gaussians(scene, camera))
     none = np.zeros((camera.height, camera.width), bool)
     if not (part & visible).any():
         return none
+    rows = np.flatnonzero(visible & _drawn_gaussians(scene, camera) & may_touch(scene.gaussians, camera))
     viewmat, K = camera.viewmat.cpu().double().numpy(), camera.K.cpu().double().numpy()
     means = scene.gaussians.means.detach().cpu().numpy()[rows]
     with np.errstate(all="ignore"):

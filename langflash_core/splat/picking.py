@@ -13,13 +13,13 @@ from jaxtyping import Bool, Float, Int
 from torch import Tensor
 
 from langflash_core.geometry.nearness import Nearness
-from langflash_core.geometry.pinhole import from_pixels, see
 from langflash_core.types import Camera, Gaussians, Scene, Semantics
 
 from .compose import DEPTH, shares
 from .contributions import composition, contributions
+from .frustum import may_touch
 from .mixing import mixing
-from .projection import ALPHA_MIN, DILATION, TAN_MARGIN, Footprints, project, view_depths
+from .projection import ALPHA_MIN, Footprints, project, view_depths
 
 SEEN = 0.05  # of a pixel's colour: a Gaussian that adds less anywhere in a region is not seen there
 
@@ -48,7 +48,9 @@ def seen_in(
     """
     near = None if through or not scene.layered else Nearness.of(scene)
     if pixels.shape == (camera.height, camera.width):
-        visible = visible & _may_touch(scene.gaussians, camera, pixels)
+        if not pixels.any():
+            return np.zeros(len(visible), bool)
+        visible = visible & may_touch(scene.gaussians, camera, _box(pixels))
     if near is not None and near.views and pixels.shape == (camera.height, camera.width):
         return _seen_in_layers(scene, near, visible, camera, pixels)
     rows, shown = _visible_gaussians(scene.gaussians, visible)
@@ -58,31 +60,10 @@ def seen_in(
     return found
 
 
-def _may_touch(
-    gaussians: Gaussians, camera: Camera, pixels: Bool[np.ndarray, "H W"]
-) -> Bool[np.ndarray, " N"]:
-    """(N,) bool: all whose footprints reach the box around some pixels, and few others.
-
-    A footprint's variance is at most (s f)^2 (1 + t^2) + e, s the longest axis over the depth, t the steepest
-    direction that `project` knows; it ends at sqrt(2 ln 255) deviations.
-    """
+def _box(pixels: Bool[np.ndarray, "H W"]) -> tuple[float, float, float, float]:
+    """The box around some pixels."""
     lines, columns = np.flatnonzero(pixels.any(1)), np.flatnonzero(pixels.any(0))
-    if not len(lines):
-        return np.zeros(len(gaussians), bool)
-    viewmat, K = camera.viewmat.cpu().double().numpy(), camera.K.cpu().double().numpy()
-    with np.errstate(all="ignore"):  # what is not finite touches nothing
-        size, means = (camera.width, camera.height), gaussians.means.cpu().numpy()
-        x, y, z, _ = see(means, viewmat, K, size, 1e-9, camera.orthographic)
-        depths = 1.0 if camera.orthographic else np.maximum(z, 1e-9)
-        steep = 0.0
-        if not camera.orthographic:
-            reach = np.maximum(-from_pixels(np.zeros(2), K), from_pixels(np.array(size), K))
-            reach += TAN_MARGIN * 0.5 * np.array(size) / np.diag(K)[:2]
-            steep = float(reach @ reach)
-        wide = gaussians.scales.cpu().numpy().max(1) / depths * max(K[0, 0], K[1, 1])
-        far = np.sqrt(2 * np.log(1 / ALPHA_MIN)) * np.sqrt(wide**2 * (1 + steep) + DILATION) + 1.0
-        across = (x >= columns[0] - far) & (x <= columns[-1] + 1 + far)
-        return across & (y >= lines[0] - far) & (y <= lines[-1] + 1 + far)
+    return (float(columns[0]), float(lines[0]), float(columns[-1] + 1), float(lines[-1] + 1))
 
 
 def _seen_in_layers(
@@ -125,6 +106,7 @@ class Sight:
 def sights(scene: Scene, visible: Bool[np.ndarray, " N"], camera: Camera) -> tuple[Sight, ...]:
     """What is visible in a view, layer by layer; for any number of `weights_at`."""
     near = Nearness.of(scene) if scene.layered else None
+    visible = visible & may_touch(scene.gaussians, camera)
     if near is None or not near.views:
         return (_sight(scene, visible, camera, 1.0),)
     chosen = near.chosen(camera)

@@ -7,6 +7,7 @@ import pytest
 import torch
 
 from langflash_core.splat import compose, picking, render
+from langflash_core.splat.frustum import may_touch
 from langflash_core.splat.picking import SEEN, seen_in, sights, weights_at
 from langflash_core.splat.reference import rasterize
 from tests.splat.scenes import camera, cloud, parallel
@@ -62,15 +63,15 @@ def test_what_cannot_touch_a_region_is_left_out_and_nothing_else(flat: bool, mon
     for line, column, side in ((0, 0, 3), (20, 24, 1), (36, 44, 4), (10, 5, 12)):
         pixels = np.zeros((40, 48), bool)
         pixels[line : line + side, column : column + side] = True
-        near = picking._may_touch(scene.gaussians, seen, pixels)
+        near = may_touch(scene.gaussians, seen, picking._box(pixels))
         asked += int(near.sum())
         for through in (False, True):
             found = seen_in(scene, visible, seen, pixels, through=through)
             with monkeypatch.context() as slowly:
-                slowly.setattr(picking, "_may_touch", lambda *_: visible)
+                slowly.setattr(picking, "may_touch", lambda *_: visible)
                 assert (found == seen_in(scene, visible, seen, pixels, through=through)).all()
     assert asked < 4 * 300, "few others"
-    assert not picking._may_touch(scene.gaussians, seen, np.zeros((40, 48), bool)).any()
+    assert not seen_in(scene, visible, seen, np.zeros((40, 48), bool)).any()
 
 
 def test_a_pixel_of_layers_is_weighed_as_their_blend() -> None:

@@ -21,6 +21,7 @@ from langflash_core.geometry.nearness import NEAREST, Nearness
 from langflash_core.language.relevance import CompiledQuery
 from langflash_core.language.settings import RELEVANCE
 from langflash_core.splat.compose import shares
+from langflash_core.splat.frustum import may_touch
 from langflash_core.splat.projection import (
     ALPHA_MIN,
     NEAR,
@@ -218,9 +219,14 @@ class _Order:
     stopping: Callable[[], bool]
 
     def kept(self) -> Tensor:
-        """(N,) bool, of the Gaussians that can be drawn and are to be shown."""
-        kept = drawable_rows(self.scene)
-        return kept if self.marks is None else kept & torch.from_numpy(self.marks[0])
+        """(N,) bool, of the Gaussians that may touch the picture, are to be shown and can be drawn."""
+        kept = torch.from_numpy(may_touch(self.scene.gaussians, self.camera))
+        if self.marks is not None:
+            kept &= torch.from_numpy(self.marks[0])
+        for rows in kept.nonzero()[:, 0].split(_AT_ONCE):
+            self._go_on()
+            kept[rows] = drawable_rows(self.scene.rows(rows))
+        return kept
 
     def splatted(self, kept: Tensor) -> _Splatted:
         """A picture of some Gaussians (N,) bool.

@@ -93,6 +93,24 @@ def test_a_large_scene_is_projected_in_parts_to_the_same_picture(scene, monkeypa
     assert torch.equal(whole.maps.weights, parts.maps.weights) and whole.depth_range == parts.depth_range
 
 
+def test_what_lies_beside_the_picture_is_not_looked_at(scene, monkeypatch) -> None:
+    """Of ten million Gaussians a room's picture took as long as a picture of all."""
+    gaussians, looked = scene.gaussians, []
+    means = torch.cat((gaussians.means, gaussians.means + torch.tensor([50.0, 0.0, 0.0])))
+    twice = scene.rows(torch.arange(len(means)) % len(gaussians))
+    twice = replace(twice, gaussians=replace(twice.gaussians, means=means))
+    real = still.drawable_rows
+
+    def drawable_rows(some):
+        looked.append(len(some.gaussians))
+        return real(some)
+
+    monkeypatch.setattr(still, "drawable_rows", drawable_rows)
+    wanted, found = draw_still(scene, camera()), draw_still(twice, camera())
+    assert np.array_equal(found.colour, wanted.colour) and np.array_equal(found.depth, wanted.depth)
+    assert len(looked) == 2 and looked[0] == looked[1] <= len(gaussians)
+
+
 def test_it_is_drawn_as_marked(gl, scene) -> None:
     random = np.random.default_rng(0)
     marks = random.random(COUNT) < 0.7, random.integers(0, 3, COUNT).astype(np.uint8)
