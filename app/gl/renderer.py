@@ -112,10 +112,11 @@ class SplatRenderer:
         if asked is not None and asked.compiled.factor.shape[0] == scene.semantics.num_atoms:
             self._question = Question(asked.compiled, asked.answers)
 
-    def give_level(self, scene: Scene, share: float, thinned: Scene, rows: np.ndarray) -> None:
-        """A level of `scene` that was thinned elsewhere (scene/thin.py), if that is on show."""
+    def give_level(self, scene: Scene, share: float, thinned: Thinned) -> None:
+        """A level of `scene` that was thinned elsewhere (scene/thin.py), if that is on show; the next picture
+        has it in place of one that is there."""
         if self._scene is not None and self._scene.scene is scene:
-            self._scene.give(share, thinned, rows)
+            self._scene.give(share, thinned)
 
     def upload(self, camera: Camera, share: float = 1.0, moving: bool = False, late: bool = False) -> bool:
         """Bring what a picture so drawn lacks to the card, one layer of the scene at the most, and find its
@@ -204,6 +205,7 @@ class SplatRenderer:
         if weight_maps and not fast:
             view.weight_maps(level)
         self._picture = picture
+        scene.forget_past()
 
     def colours(self, camera: Camera, *, fade: bool = False, fill: bool = False) -> np.ndarray:
         """(H, W, 3) uint8, the scene's colours over black and nothing else: for pictures one after the other.
@@ -243,6 +245,7 @@ class SplatRenderer:
         view.forget_maps()  # it has its own
         drawn = Drawn(view.colour, still.camera, background, still.key, self._fill)
         self._picture = StillPicture(self._scene, view, drawn, still)
+        self._scene.forget_past()
 
     def fill(self, gaps: bool) -> None:
         """Whether pictures of colours show what is around their gaps (scene/gaps.py), from now on and in the

@@ -1,7 +1,7 @@
 """What lives as long as the scene: its Gaussians by level of detail, their marks, what its photos see."""
 
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 
 import moderngl
@@ -21,11 +21,19 @@ from .level import Level
 from .painter import Painter
 from .photos import PhotoDepths
 from .shapes import MakeShapes
-from .splats import SplatBuffers
+from .splats import Drawable, SplatBuffers
 
-MakeSplats = Callable[[moderngl.Context, Programs, Scene, MakeShapes], SplatBuffers]
-Thinned = tuple[Scene, np.ndarray]
-"""What `thin_with_rows` gives."""
+MakeSplats = Callable[[moderngl.Context, Programs, Scene | Drawable, MakeShapes], SplatBuffers]
+
+
+@dataclass(frozen=True)
+class Thinned:
+    """Some of a scene's Gaussians, made on whatever thread. scene: of n of them; rows: (n,), which of the
+    whole scene's these are. drawable: it, made ready for the card; None: not yet."""
+
+    scene: Scene
+    rows: np.ndarray
+    drawable: Drawable | None = None
 
 
 class LiveScene:
@@ -48,11 +56,13 @@ class LiveScene:
         self._changes: tuple[Change, ...] = ()
         self._photos: dict[bool, PhotoDepths] = {}  # by whether each sees its own Gaussians alone
         self._levels: dict[float, Level | LayeredLevel] = {}  # by share of the Gaussians
+        self._next: dict[float, Thinned] = {}  # to come in place of those
+        self._past: list[Level | LayeredLevel] = []  # which the picture on show may still need
         self._near: Nearness | None = None
         if thinned is None:
             self.level(share)
         else:
-            self.give(share, *thinned)
+            self.give(share, thinned)
 
     @property
     def whole(self) -> Level | LayeredLevel:
@@ -78,16 +88,27 @@ class LiveScene:
         return feature_axes(semantics.dictionary.double().numpy(), masses)
 
     def level(self, share: float) -> Level | LayeredLevel:
-        """The level of so many Gaussians; made once."""
-        if share not in self._levels:
+        """The level of so many Gaussians; made once, until another is given."""
+        following = self._next.pop(share, None)
+        if following is not None:
+            self._past.append(self._levels.pop(share))
+            self._make(share, following)
+        elif share not in self._levels:
             everything = self.scene, np.arange(len(self.scene.gaussians))
-            self._made(share, *(everything if share == 1 else thin_with_rows(self.scene, share)))
+            self._make(share, Thinned(*(everything if share == 1 else thin_with_rows(self.scene, share))))
         return self._levels[share]
 
-    def give(self, share: float, thinned: Scene, rows: np.ndarray) -> None:
-        """The level of so many Gaussians as `thin_with_rows` made it, on whatever thread."""
-        if share not in self._levels:
-            self._made(share, thinned, rows)
+    def give(self, share: float, thinned: Thinned) -> None:
+        """The level of so many Gaussians; in place of one that is there from the next picture on."""
+        if share in self._levels:
+            self._next[share] = thinned
+        else:
+            self._make(share, thinned)
+
+    def forget_past(self) -> None:
+        """Give levels back in whose place others came, once another picture is on show."""
+        while self._past:
+            self._past.pop().release()
 
     def nearness(self) -> Nearness:
         """Which layers a camera sees, of a layered scene as edits left it."""
@@ -132,20 +153,21 @@ class LiveScene:
         for level in self._levels.values():
             level.forget()
 
-    def _made(self, share: float, scene: Scene, rows: np.ndarray) -> None:
+    def _make(self, share: float, thinned: Thinned) -> None:
+        scene, rows = thinned.scene, thinned.rows
         if scene.layered and self.nearness().views:
             level = LayeredLevel(scene, rows, self._level_of, self.nearness)
         else:
-            level = self._level_of(scene, rows)
+            level = self._level_of(scene, rows, thinned.drawable)
         self._levels[share] = level
         if self._changes:
             level.change(self._changes)
         if self._marks is not None:
             level.mark(*self._marks)
 
-    def _level_of(self, scene: Scene, rows: np.ndarray) -> Level:
+    def _level_of(self, scene: Scene, rows: np.ndarray, drawable: Drawable | None = None) -> Level:
         painter = self._painter
-        splats = self._make_splats(painter.ctx, painter.programs, scene, painter.shapes)
+        splats = self._make_splats(painter.ctx, painter.programs, drawable or scene, painter.shapes)
         return Level(splats, rows, scene.gaussians)
 
     def release(self) -> None:
@@ -153,4 +175,6 @@ class LiveScene:
         for level in self._levels.values():
             level.release()
         self._levels.clear()
+        self._next.clear()
+        self.forget_past()
         self._drop_photos()

@@ -1,10 +1,11 @@
 """One scene's Gaussians on the GPU: sorted, projected, and their weights expanded, per camera."""
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import moderngl
 import numpy as np
 import torch
+from torch import Tensor
 
 from langflash_core.base.graphics import Programs, set_uniforms
 from langflash_core.splat.projection import ALPHA_MIN, drawable_rows
@@ -23,6 +24,26 @@ _PLAIN = np.array([[1.0] * 3, [0.0] * 3])  # the light of a camera without one
 _WIDEST = 1e12  # scene units: wider Gaussians are flat over any view, and float32 squares end at 1e38
 
 
+@dataclass(frozen=True)
+class Drawable:
+    """What of a scene can be drawn, ready for the card. gaussians: (N,) those, without harmonics; kept:
+    (all,) bool, which of the scene's these are; sh: (all, S, 3), of all; carried: their weights."""
+
+    gaussians: Gaussians
+    kept: np.ndarray
+    sh: Tensor
+    carried: Carried
+
+    @staticmethod
+    def of(scene: Scene) -> "Drawable":
+        """On whatever thread."""
+        gaussians, kept = _drawable(scene)
+        semantics, rows = scene.semantics, torch.from_numpy(kept)
+        values = semantics.weight_values.detach().cpu().float()[rows].numpy()
+        carried = Carried(semantics.weight_ids.cpu()[rows].numpy(), values, semantics.num_atoms)
+        return Drawable(gaussians, kept, scene.gaussians.sh.detach().cpu().float(), carried)
+
+
 class SplatBuffers:
     """Owns the vertex data of a scene; `sort` or `follow` choose and order, `project` and `expand` fill.
 
@@ -35,23 +56,20 @@ class SplatBuffers:
         self,
         ctx: moderngl.Context,
         programs: Programs,
-        scene: Scene,
+        scene: Scene | Drawable,
         shapes: MakeShapes = Quads,
         reach: float | None = None,
     ):
         """shapes: what they are drawn as."""
-        gaussians, self._kept = _drawable(scene)
-        sh, semantics = scene.gaussians.sh.detach().cpu().float(), scene.semantics
-        kept = torch.from_numpy(self._kept)
-        values = semantics.weight_values.detach().cpu().float()[kept].numpy()
-        self.carried = Carried(semantics.weight_ids.cpu()[kept].numpy(), values, semantics.num_atoms)
+        own = scene if isinstance(scene, Drawable) else Drawable.of(scene)
+        gaussians, self._kept, self.carried = own.gaussians, own.kept, own.carried
         self.num_gaussians = len(gaussians)
         self.shapes = shapes(ctx)
         self._defines = {} if reach is None else {"REACH": reach}
         self._ctx = ctx
         self._programs = programs
         self._ordering = Ordering(gaussians.means, gaussians.scales)
-        self._vertices = Vertices(ctx, gaussians, sh, np.flatnonzero(self._kept))
+        self._vertices = Vertices(ctx, gaussians, own.sh, np.flatnonzero(self._kept))
         self._textures = CarriedTextures(ctx, programs, self.carried)
         self._order_buffer = ctx.buffer(reserve=4 * max(1, self.num_gaussians))
         self.places = ctx.buffer(reserve=4 * PLACE_FLOATS * max(1, self.num_gaussians))

@@ -14,6 +14,8 @@ import math
 from dataclasses import dataclass, field, replace
 from enum import Enum
 
+from langflash_core.geometry.poses import Vector
+
 MOVING_SECONDS = 0.060
 QUICK_SECONDS = 0.15  # a full picture this quick is drawn as soon as the hands rest
 SETTLE_AFTER = 0.12  # seconds since the last motion, key or pointer event
@@ -23,6 +25,9 @@ MIDDLING_SCENE = 30_000  # the same where OpenGL runs on the processor
 HUGE_SCENE = 3_000_000  # the same, from which bringing all of them there would stop the window for seconds
 MANY_ROWS = 1_000_000  # Gaussians, of which taking the coarse ones takes a frame's time
 MANY_COARSE = 60_000  # coarse Gaussians, from which drawing fewer of these pays there
+FAR = 0.2
+"""Of the way to the middle Gaussian of what moves through a huge scene: an eye that has come so far wants
+other ones, since what is near has grown by as much."""
 _RUNG_FACTOR = 1.8  # about what a rung saves
 
 
@@ -98,6 +103,19 @@ def _ladder(num_gaussians: int, slow: bool, coarse: float) -> tuple[tuple[float,
     if num_gaussians >= LARGE_SCENE:
         return SIZES_OF_LARGE_SCENES
     return SIZES_OF_MIDDLING_SCENES if slow and num_gaussians >= MIDDLING_SCENE else SIZES
+
+
+@dataclass(frozen=True)
+class Around:
+    """Where the share of a huge scene was chosen that moves. reach: how far from the eye its middle Gaussian
+    is, scene units."""
+
+    eye: Vector
+    reach: float
+
+    def serves(self, eye: Vector) -> bool:
+        """Whether another eye sees about the same sizes."""
+        return math.dist(self.eye, eye) <= FAR * self.reach
 
 
 @dataclass(frozen=True)

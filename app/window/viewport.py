@@ -15,7 +15,7 @@ from jaxtyping import UInt8
 
 from langflash_core.base.graphics import draws_in_software
 from langflash_core.errors import GraphicsError
-from langflash_core.geometry.poses import Pose
+from langflash_core.geometry.poses import Pose, Vector
 from langflash_core.scene.changes import Change
 from langflash_core.scene.edits import Marks
 from langflash_core.scene.mask import Mask
@@ -24,6 +24,7 @@ from .drawing.marked import Marked
 from .drawing.picture import ScenePicture
 from .drawing.values import Stand, View
 from .editing.state import Point, Reading
+from .governor import Around, Governor
 from .scene.memory import SceneMemory
 from .state import State
 
@@ -34,6 +35,7 @@ if TYPE_CHECKING:
     from langflash_core.types import Scene
 
     from ..gl import SplatRenderer
+    from ..gl.scene import Thinned
 
 log = logging.getLogger(__name__)
 
@@ -57,7 +59,9 @@ class Viewport:
         self._stand = Stand()
         self._adjusting = False  # what is drawn changes with every frame
         self._fresh = False  # a scene has just been taken
-        self._awaited: tuple[int, Scene, float] | None = None  # a large scene, and the share that is to come
+        self._awaited: tuple[int, Scene, Governor] | None = None  # a large scene, whose share is to come
+        self._around: Around | None = None  # where the share of a huge scene was chosen
+        self._choosing = False  # it anew, on the worker's thread
         self._asked: tuple[tuple[int, ...], CompiledQuery | None, int] | None = None  # of it, meanwhile
 
     def _made(self) -> "SplatRenderer":
@@ -105,7 +109,8 @@ class Viewport:
         Raises:
             GraphicsError: the OpenGL here cannot do it.
         """
-        self._warming = self._awaited = self._asked = None
+        self._warming = self._awaited = self._asked = self._around = None
+        self._choosing = False
         renderer = self._made()
         self._keep_look(changed)
         if self.picture is not None:
@@ -116,7 +121,7 @@ class Viewport:
 
             governor = governor_of(scene)
             if governor.waits:
-                self._awaited = serial, scene, governor.share
+                self._awaited = serial, scene, governor
                 return
             self._begin(ProcessorPicture(renderer, serial, scene, self._notify), scene)
         else:
@@ -147,12 +152,12 @@ class Viewport:
             self._before.release()
         self._before = None
 
-    def _begin_thinned(self, serial: int, scene: "Scene", thinned: "Scene", rows: np.ndarray) -> None:
+    def _begin_thinned(self, serial: int, scene: "Scene", thinned: "Thinned") -> None:
         """Show a large scene, now that the share of it that moves is made."""
         from .drawing.processor import ProcessorPicture
 
         self._awaited = None
-        picture = ProcessorPicture(self._made(), serial, scene, self._notify, (thinned, rows))
+        picture = ProcessorPicture(self._made(), serial, scene, self._notify, thinned)
         self._begin(picture, scene)
         if self._asked is not None:
             picture.ask(*self._asked)
@@ -187,21 +192,35 @@ class Viewport:
     def shares(self) -> tuple[float, ...]:
         """Of the scene's Gaussians, that moving through it wants; `thin` takes them."""
         if self._awaited is not None:
-            return (self._awaited[2],)
+            governor = self._awaited[2]
+            return () if governor.huge else (governor.share,)
         return () if self.picture is None else self.picture.governor.wants
 
-    def thin(self, scene: "Scene", share: float, thinned: "Scene", rows: np.ndarray) -> None:
-        """A share of the scene's Gaussians is made.
+    def share_around(self, eye: Vector) -> float | None:
+        """Of a huge scene's Gaussians, that is to be chosen for this eye; None while what there is serves."""
+        drawn = None if self.picture is None else self.picture.governor
+        governor = self._awaited[2] if self._awaited is not None else drawn
+        if governor is None or not governor.huge or self._choosing:
+            return None
+        if self._around is not None and self._around.serves(eye):
+            return None
+        self._choosing = True
+        return governor.share
+
+    def thin(self, scene: "Scene", share: float, thinned: "Thinned", around: Around | None = None) -> None:
+        """A share of the scene's Gaussians is made, of a huge one around a place.
 
         Raises:
             GraphicsError: the OpenGL here cannot do it.
         """
         awaited = self._awaited
-        if awaited is not None and awaited[1] is scene and awaited[2] == share:
-            self._begin_thinned(awaited[0], scene, thinned, rows)
+        if awaited is not None and awaited[1] is scene and awaited[2].share == share:
+            self._begin_thinned(awaited[0], scene, thinned)
         elif self.picture is not None:
-            self.picture.easel.renderer.give_level(scene, share, thinned, rows)
+            self.picture.easel.renderer.give_level(scene, share, thinned)
             self.picture.governor = self.picture.governor.with_share(share)
+        if around is not None:
+            self._around, self._choosing = around, False
 
     def update(self, state: State, size: tuple[int, int], touched: float) -> float:
         """Bring the picture up to date; returns seconds until it wants to be called again.

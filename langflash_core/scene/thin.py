@@ -1,5 +1,6 @@
 """Fewer Gaussians for a moving camera on a slow machine: wider ones, or coarse ones and some detail."""
 
+import math
 from dataclasses import replace
 
 import numpy as np
@@ -53,11 +54,42 @@ def thin_with_rows(scene: Scene, share: float) -> tuple[Scene, Int[np.ndarray, "
     coarse = coarse_share(scene)
     if coarse < 1:
         return _thin_levels(scene, share, coarse)
-    chances = inclusion(covered_areas(scene.gaussians), share * len(scene.gaussians))
-    rows = np.sort(_draw_rows(chances, scene))
-    kept = torch.from_numpy(rows)
+    return _drawn(scene, covered_areas(scene.gaussians), _curve(scene), share)
+
+
+class Thinner:
+    """`thin` of a huge scene without levels from one place after the other: the same number of Gaussians, all
+    of those near the eye and the fewer the farther they are.
+
+    As `thin`, with p_i = min(1, c a_i / r_i^2), r_i the distance from the eye: what a Gaussian covers of the
+    eye's picture decides instead of what it covers of the scene. What does not depend on the eye is computed
+    once.
+    """
+
+    def __init__(self, scene: Scene) -> None:
+        self._scene = scene
+        self._areas = covered_areas(scene.gaussians)
+        self._along = _curve(scene)
+
+    def around(self, eye: Float[np.ndarray, "3"], share: float) -> tuple[Scene, Int[np.ndarray, " n"], float]:
+        """The scene with at most ceil(share N) Gaussians, their rows, ascending, and how far from the eye the
+        middle one of them is, scene units."""
+        apart = self._scene.gaussians.means.detach().cpu().numpy() - np.asarray(eye, np.float32)
+        far = np.einsum("nc,nc->n", apart, apart).astype(np.float64)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            seen = np.where(self._areas > 0, self._areas / np.maximum(far, 1e-12), 0.0)
+        thinned, rows = _drawn(self._scene, seen, self._along, share)
+        return thinned, rows, math.sqrt(float(np.median(far[rows]))) if len(rows) else math.inf
+
+
+def _drawn(
+    scene: Scene, sizes: np.ndarray, along: np.ndarray, share: float
+) -> tuple[Scene, Int[np.ndarray, " n"]]:
+    """About `share` of the Gaussians, by sizes (N,), wider in return."""
+    chances = inclusion(sizes, share * len(sizes))
+    rows = np.sort(_draw_rows(chances, along))
     growth = torch.from_numpy(chances[rows] ** -0.5).to(scene.gaussians.scales)
-    thinned = scene.rows(kept)
+    thinned = scene.rows(torch.from_numpy(rows))
     wider = replace(thinned.gaussians, scales=thinned.gaussians.scales * growth[:, None])
     return replace(thinned, gaussians=wider), rows
 
@@ -89,7 +121,7 @@ def _thin_levels(scene: Scene, share: float, coarse: float) -> tuple[Scene, np.n
             fine.gaussians.rows(torch.from_numpy(own)),
         )
     chances = inclusion(tells, share * len(levels) - len(closed))
-    chosen = detail[_draw_rows(chances, fine)]
+    chosen = detail[_draw_rows(chances, _curve(fine))]
     rows = np.sort(np.concatenate((closed, chosen)))
     return scene.rows(torch.from_numpy(rows)), rows
 
@@ -117,11 +149,16 @@ def _layers(scene: Scene) -> list[np.ndarray]:
     return [views == view for view in np.unique(views)]
 
 
-def _draw_rows(chances: np.ndarray, scene: Scene) -> np.ndarray:
-    """Rows that one draw along a space-filling curve keeps, each with its chance (N,)."""
+def _curve(scene: Scene) -> Int[np.ndarray, " N"]:
+    """Rows along a space-filling curve, of a scene of layers through one after the other."""
     along = z_order(scene.gaussians.means.detach().cpu().numpy())
     if scene.layered and scene.view_ids is not None:
         along = along[np.argsort(scene.view_ids.cpu().numpy()[along], kind="stable")]
+    return along
+
+
+def _draw_rows(chances: np.ndarray, along: np.ndarray) -> np.ndarray:
+    """Rows that one draw along a curve keeps, each with its chance (N,)."""
     ends = np.floor(np.cumsum(chances[along]) + 1e-9)
     return along[np.diff(ends, prepend=0.0) > 0]
 

@@ -8,6 +8,7 @@ import torch
 
 from langflash_core.base.records import Record
 from langflash_core.scene.thin import (
+    Thinner,
     coarse_level,
     coarse_share,
     covered_areas,
@@ -105,6 +106,35 @@ def test_the_curve_keeps_neighbours_together():
         np.linalg.norm(np.diff(along, axis=0), axis=1).mean()
         < 0.25 * np.linalg.norm(np.diff(means, axis=0), axis=1).mean()
     )
+
+
+def test_around_an_eye_what_is_near_stays_as_it_is_and_what_is_far_gives_way():
+    """Two walls alike, one near and one ten times as far: an eye at the near one keeps all of it."""
+    near, far = cloud(1000, 5), cloud(1000, 5)
+    means = torch.cat((near.gaussians.means, far.gaussians.means + torch.tensor([0.0, 0.0, 20.0])))
+    scene = near.rows(torch.arange(2000) % 1000)
+    scene = replace(scene, gaussians=replace(scene.gaussians, means=means))
+    thinner, counts = Thinner(scene), []
+    for eye in (np.array([0.0, 0.0, 0.0]), np.array([0.0, 0.0, 22.0])):
+        kept, rows, reach = thinner.around(eye, 0.5)
+        assert 999 <= len(rows) <= 1000 and torch.equal(kept.gaussians.means, means[rows])
+        grown = kept.gaussians.scales / scene.gaussians.scales[rows]
+        apart = np.linalg.norm(means[rows].numpy() - eye, axis=1)
+        assert abs(np.median(apart) - reach) < 1e-5
+        counts.append(int((rows < 1000).sum()))
+        assert grown[apart < 5].median() < 1.05 < 2 < grown[apart > 5].median()
+    assert counts[0] > 900 > 100 > counts[1]
+
+
+def test_around_an_eye_nothing_broken_is_kept():
+    scene = cloud(300, 5)
+    means = scene.gaussians.means.clone()
+    means[::3] = torch.nan
+    scene = replace(scene, gaussians=replace(scene.gaussians, means=means))
+    kept, rows, _ = Thinner(scene).around(means[1].numpy(), 0.4)  # in the middle of one
+    assert len(rows) and not (rows % 3 == 0).any() and torch.isfinite(kept.gaussians.scales).all()
+    unseen = replace(scene, gaussians=replace(scene.gaussians, opacities=torch.zeros(300)))
+    assert Thinner(unseen).around(np.zeros(3), 0.4)[1:] == (pytest.approx(np.zeros(0)), np.inf)
 
 
 def test_nothing_to_thin():

@@ -31,6 +31,7 @@ from scipy.spatial import KDTree
 
 import langflash_core as lf
 from app.gl import moving_renderer
+from app.gl.scene import Thinned
 from app.window.commands import Command, Tick, apply
 from app.window.editing.effects import EditingEffects
 from app.window.effects import Hands
@@ -101,7 +102,7 @@ class Window:
         self._effects = (drawn, EditingEffects(hands, self.viewport))
         self.perform(SceneArrived(describe_scene(scene, 1, "walk")))
         for share in self.viewport.shares:  # the window's worker does so
-            self.viewport.thin(scene, share, *thin_with_rows(scene, share))
+            self.viewport.thin(scene, share, Thinned(*thin_with_rows(scene, share)))
 
     def perform(self, command: Command) -> None:
         before, self.state = self.state, apply(self.state, command)

@@ -4,8 +4,6 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-import numpy as np
-
 from langflash_core.geometry import poses
 from langflash_core.images.settings import PHOTO_LIMITS
 from langflash_core.images.still_names import shown_name
@@ -15,6 +13,7 @@ from ..commands import NOTHING_TO_SAVE, Command, Notify, ShowDialog
 from ..dialogs import Dialog
 from ..editing.state import fresh
 from ..filming.state import NO_FILMING
+from ..governor import Around
 from ..state import State
 from .memory import SceneMemory
 from .near import first_stand
@@ -35,6 +34,8 @@ from .unfinished import FEWEST
 
 if TYPE_CHECKING:
     from langflash_core.types import Scene
+
+    from ...gl.scene import Thinned as Fewer
 
 
 # Photos
@@ -341,12 +342,13 @@ def _rooms(state: State, coming: SceneInfo) -> tuple[Room, ...]:
 
 @dataclass(frozen=True)
 class Thinned:
-    """A share of the scene's Gaussians for a moving camera is made (scene/thin.py)."""
+    """A share of the scene's Gaussians for a moving camera is made (scene/thin.py), of a huge scene around
+    a place."""
 
     scene: "Scene" = field(compare=False, repr=False)
     share: float
-    thinned: "Scene" = field(compare=False, repr=False)
-    rows: np.ndarray = field(compare=False, repr=False)
+    thinned: "Fewer" = field(compare=False, repr=False)
+    around: Around | None = None
 
     def apply(self, state: State) -> State:
         return state

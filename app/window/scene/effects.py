@@ -59,6 +59,7 @@ from .work import (
     ReconstructPhotos,
     ShowPhotos,
     Thin,
+    ThinAround,
     WriteScene,
 )
 
@@ -104,9 +105,9 @@ class SceneEffects(Effects):
                 self._show(info, before.scene.info, changed)
                 for share in self._viewport.shares:
                     submit(Thin(info.serial, info.scene, share))
-            case Thinned(scene, share, thinned, rows):
+            case Thinned(scene, share, thinned, around):
                 with self._told():
-                    self._viewport.thin(scene, share, thinned, rows)
+                    self._viewport.thin(scene, share, thinned, around)
             case TakeHold(at):
                 self._hold(at)
             case Loaded() if state.scene.info is None and self._viewport.warm():
@@ -115,6 +116,13 @@ class SceneEffects(Effects):
                 self._go_on(command, before, state)
         self._look_for_work(before, state)
         self._show_whole(before, state)
+
+    def after_picture(self, state: State) -> None:
+        """What moves through a huge scene is chosen anew where the camera has come far."""
+        info, eye = state.scene.info, state.scene.pose.centre
+        share = None if info is None else self._viewport.share_around(eye)
+        if info is not None and share is not None:
+            self._hands.submit(ThinAround(info.serial, info.memory, share, eye))
 
     def _grow(self, command: MergeScene | AddToScene, state: State) -> None:
         """What comes to the scene on show."""

@@ -23,6 +23,7 @@ from langflash_core.scene.doubts import doubtful, told_warnings
 from langflash_core.scene.edits import History, Marks
 
 from ..commands import Command, ShowPicture
+from ..governor import Around
 from ..requests import Asked, Job, SceneTask, Task
 from . import unfinished
 from .commands import (
@@ -257,7 +258,32 @@ class Thin(SceneTask):
     def run(self, stopping: Asked) -> Iterator[Command]:
         from langflash_core.scene.thin import thin_with_rows
 
-        yield Thinned(self.scene, self.share, *thin_with_rows(self.scene, self.share))
+        from ...gl.scene import Thinned as Fewer
+
+        yield Thinned(self.scene, self.share, Fewer(*thin_with_rows(self.scene, self.share)))
+
+
+@dataclass(frozen=True)
+class ThinAround(SceneTask):
+    """The same of a huge scene: fine around the eye, and the coarser the farther away."""
+
+    newest_counts = True
+
+    memory: SceneMemory = field(repr=False)
+    share: float
+    eye: Vector
+
+    def run(self, stopping: Asked) -> Iterator[Command]:
+        from langflash_core.scene.thin import Thinner
+
+        from ...gl.scene import Thinned as Fewer
+        from ...gl.splats import Drawable
+
+        scene = self.memory.scene
+        thinner = self.memory.answered("thinner", (), lambda: Thinner(scene))
+        thinned, rows, reach = thinner.around(np.array(self.eye), self.share)
+        fewer = Fewer(thinned, rows, Drawable.of(thinned))
+        yield Thinned(scene, self.share, fewer, Around(self.eye, reach))
 
 
 @dataclass(frozen=True)

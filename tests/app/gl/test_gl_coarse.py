@@ -8,6 +8,7 @@ import pytest
 import torch
 
 from app.gl import SplatRenderer, moving_renderer
+from app.gl.scene import Thinned
 from langflash_core.scene.changed import apply_changes
 from langflash_core.scene.changes import Change, Moved, Recoloured, turn_about
 from langflash_core.scene.mask import Mask
@@ -134,7 +135,7 @@ def test_fewer_of_them_and_some_detail_follow_marks_and_changes(pair, scene, sha
         Moved(Mask.of(~shown), offset=(0.1, 0.0, 0.0)),
         Moved(Mask.full(COUNT), offset=(0.0, 0.1, 0.0)),
     )
-    pair[0].give_level(scene, share, thinned, rows)
+    pair[0].give_level(scene, share, Thinned(thinned, rows))
     pair[0].mark(shown, np.zeros(COUNT, np.uint8))
     pair[0].change(changes)
     pair[0].draw(aside(), share=share)

@@ -13,6 +13,7 @@ from app.gl.hardware import CARD, PROCESSOR, hardware_of
 from app.gl.layered import KEPT, MOVING, LayeredLevel, half
 from app.gl.processor.cell_maps import CellMaps
 from app.gl.processor.still import draw_still
+from app.gl.scene import Thinned
 from app.gl.weights import WeightMaps
 from langflash_core.base.graphics import draws_in_software
 from langflash_core.base.records import Record
@@ -553,7 +554,7 @@ def test_a_thinned_level_keeps_every_layer_closed(renderer):
             full, left = (reference.render(s.layer(view), s.camera(view)) for s in (known, thinned))
             assert left.alphas.mean() >= 0.93 * full.alphas.mean()
         renderer.set_scene(known)
-        renderer.give_level(known, share, thinned, rows)
+        renderer.give_level(known, share, Thinned(thinned, rows))
         renderer.draw(between(3), share=share, weight_maps=False)
         assert renderer.frame().alphas.mean() > 0.5
 

@@ -10,19 +10,22 @@ import torch
 
 from app.gl.layered import LayeredLevel
 from app.gl.processor import still
+from app.gl.scene import Thinned
 from app.window.asking.commands import Answered, Narrowed
 from app.window.asking.work import Answer
 from app.window.drawing.card import CardPicture
 from app.window.drawing.processor import ProcessorPicture
 from app.window.drawing.stills import RETRY_SECONDS
 from app.window.governor import Governor, Kind, Plan
+from app.window.scene import commands as show
 from app.window.scene.commands import SceneArrived
 from app.window.scene.memory import SceneMemory
+from app.window.scene.work import ThinAround
 from app.window.state import State
 from app.window.viewport import Viewport
 from langflash_core.base import pictures
 from langflash_core.geometry.nearness import NEAREST
-from langflash_core.geometry.poses import from_view, orbit
+from langflash_core.geometry.poses import Vector, from_view, orbit
 from langflash_core.language.relevance import compile_query
 from langflash_core.language.spaces import language_space
 from langflash_core.language.spoken import compile_spoken
@@ -290,7 +293,7 @@ def test_a_scene_with_levels_moves_coarse_and_rests_whole(viewport, monkeypatch)
     live = viewport._made()._scene
     assert live is not None and {*live._levels} == {0.25}
     for share in viewport.shares:
-        viewport.thin(scene, share, *thin_with_rows(scene, share))
+        viewport.thin(scene, share, Thinned(*thin_with_rows(scene, share)))
     assert picture.governor.ladder[2:4] == ((0.75, 0.625), (0.5, 0.625))
     for _ in range(300):
         state = replace(state, now=state.now + 0.05)
@@ -352,13 +355,17 @@ def test_of_a_huge_scene_only_a_share_is_brought_to_opengl_on_the_processor(view
     viewport.set_scene(1, scene)
     if isinstance(viewport.picture, CardPicture):
         pytest.skip("OpenGL here has a graphics card")
-    assert viewport.picture is None and viewport.shares == (share,) and not viewport.whole
+    assert viewport.picture is None and viewport.shares == () and not viewport.whole
+    eye = state.scene.pose.centre
+    assert viewport.share_around(eye) == share and viewport.share_around(eye) is None, "it is on its way"
     viewport.ask((0,), compile_query(scene, space, list(PHRASES[:1])))
     viewport.update(state, SIZE, touched=0.0)
     other = room(torch.eye(3, 384))
-    viewport.thin(other, share, *thin_with_rows(other, share))  # of a scene that was there before
+    viewport.thin(other, share, Thinned(*thin_with_rows(other, share)))  # of a scene that was there before
     assert viewport.picture is None and viewport.drawn is None
-    viewport.thin(scene, share, *thin_with_rows(scene, share))
+    (made,) = ThinAround(1, SceneMemory(scene), share, eye).run(lambda: False)
+    assert isinstance(made, show.Thinned)
+    viewport.thin(made.scene, made.share, made.thinned, made.around)
     picture = viewport.picture
     assert picture is not None and picture.easel.asked.keys == (0,) and viewport.shares == ()
     plans = []
@@ -374,6 +381,21 @@ def test_of_a_huge_scene_only_a_share_is_brought_to_opengl_on_the_processor(view
     assert live is not None and {*live._levels} == {share}
     moved = {plan.share for plan in plans[:20] if plan is not None}
     assert moved == {share} and plans[-1] is not None and plans[-1].share == 1
+    # From far away other ones are chosen; the picture at rest stays, and the next that moves has them.
+    assert made.around is not None and viewport.share_around(eye) is None
+    far = Vector(eye.x, eye.y, eye.z - made.around.reach)
+    assert viewport.share_around(far) == share
+    (other,) = ThinAround(1, SceneMemory(scene), share, far).run(lambda: False)
+    assert isinstance(other, show.Thinned)
+    shown, level = viewport.drawn, live.level(share)
+    viewport.thin(other.scene, other.share, other.thinned, other.around)
+    viewport.update(replace(state, now=state.now + 0.05), SIZE, touched=0.0)
+    assert viewport.drawn == shown and viewport.texture is not None
+    for turn in range(60):
+        state = replace(state.with_scene(pose=orbit(START, -0.02 * turn, 0.0)), now=state.now + 0.05)
+        viewport.update(state, SIZE, touched=state.now)
+    assert live.level(share) is not level and viewport.texture is not None and viewport.whole is False
+    assert np.array_equal(live.level(share)._rows, other.thinned.rows)
 
 
 def test_the_coarse_ones_of_a_large_scene_are_taken_beside_the_frames(viewport, monkeypatch) -> None:
@@ -387,7 +409,7 @@ def test_the_coarse_ones_of_a_large_scene_are_taken_beside_the_frames(viewport, 
     if isinstance(viewport.picture, CardPicture):
         pytest.skip("OpenGL here has a graphics card")
     assert viewport.picture is None and viewport.shares == (share,)
-    viewport.thin(scene, share, *thin_with_rows(scene, share))
+    viewport.thin(scene, share, Thinned(*thin_with_rows(scene, share)))
     picture = viewport.picture
     assert isinstance(picture, ProcessorPicture) and picture.governor.share == share
     live = viewport._made()._scene
