@@ -25,6 +25,7 @@ MIDDLING_SCENE = 30_000  # the same where OpenGL runs on the processor
 HUGE_SCENE = 3_000_000  # the same, from which bringing all of them there would stop the window for seconds
 MANY_ROWS = 1_000_000  # Gaussians, of which taking the coarse ones takes a frame's time
 MANY_COARSE = 60_000  # coarse Gaussians, from which drawing fewer of these pays there
+LEAST_OF_HUGE = 0.25  # of the share of a huge scene that moves: where the smallest picture of all is too slow
 FAR = 0.2
 """Of the way to the middle Gaussian of what moves through a huge scene: an eye that has come so far wants
 other ones, since what is near has grown by as much."""
@@ -160,7 +161,7 @@ class Governor:
     def _best(self) -> tuple[tuple[float, float], ...]:
         """The ladder once everything is made."""
         if self.huge:
-            return tuple((scale, self.share) for scale, _ in SIZES)
+            return (*((scale, self.share) for scale, _ in SIZES), (SIZES[-1][0], self.share * LEAST_OF_HUGE))
         return _ladder(self.num_gaussians, self.slow, self.coarse)
 
     @property

@@ -191,15 +191,21 @@ class Viewport:
     @property
     def shares(self) -> tuple[float, ...]:
         """Of the scene's Gaussians, that moving through it wants; `thin` takes them."""
+        governor = self._governor
+        if governor is None or governor.huge:  # whose shares are chosen around the eye
+            return ()
+        return governor.wants if self._awaited is None else (governor.share,)
+
+    @property
+    def _governor(self) -> Governor | None:
+        """Of the scene on show, or of the one that is to come."""
         if self._awaited is not None:
-            governor = self._awaited[2]
-            return () if governor.huge else (governor.share,)
-        return () if self.picture is None else self.picture.governor.wants
+            return self._awaited[2]
+        return None if self.picture is None else self.picture.governor
 
     def share_around(self, eye: Vector) -> float | None:
         """Of a huge scene's Gaussians, that is to be chosen for this eye; None while what there is serves."""
-        drawn = None if self.picture is None else self.picture.governor
-        governor = self._awaited[2] if self._awaited is not None else drawn
+        governor = self._governor
         if governor is None or not governor.huge or self._choosing:
             return None
         if self._around is not None and self._around.serves(eye):

@@ -7,6 +7,7 @@ from langflash_core.geometry.pinhole import see
 
 MIN_REACH = 0.02
 """Scene units; what is nearer is inside the lens."""
+_ENOUGH = 200_000  # Gaussians that tell a median: of ten million and 80 photos all of them took half a minute
 
 
 def median_reach(
@@ -23,6 +24,7 @@ def median_reach(
     Returns:
         Depth in scene units; 1, the scene's own unit, when nothing is in front.
     """
+    means = means[:: 1 + len(means) // _ENOUGH]
     x, y, z, inside = see(means, viewmat, K, size, MIN_REACH)
     middle = inside & (abs(x / size[0] - 0.5) < 0.25) & (abs(y / size[1] - 0.5) < 0.25)
     return float(np.median(z[middle])) if middle.any() else 1.0

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 import torch
 
-from langflash_core.geometry import poses, rotations
+from langflash_core.geometry import poses, reach, rotations
 from langflash_core.geometry.cameras import transform
 from langflash_core.geometry.poses import FOV_RANGE, Pose, Rotation, Vector
 from langflash_core.geometry.quaternions import quats_to_matrices
@@ -117,6 +117,16 @@ def test_median_reach_looks_only_at_the_middle_and_the_front() -> None:
     means = np.array([[0, 0, 2.0], [0, 0.1, 3.0], [0.1, 0, 4.0], [9, 0, 10.0], [0, 0, -5.0]])
     assert median_reach(means, np.eye(4), K, (100, 100)) == 3.0
     assert median_reach(np.zeros((0, 3)), np.eye(4), K, (100, 100)) == 1.0
+
+
+def test_some_of_millions_tell_the_reach(monkeypatch) -> None:
+    K = np.array([[100.0, 0, 50], [0, 100.0, 50], [0, 0, 1]])
+    means = np.random.default_rng(0).normal((0, 0, 5), 0.5, (5000, 3))
+    asked, real = [], reach.see
+    monkeypatch.setattr(reach, "_ENOUGH", 1000)
+    monkeypatch.setattr(reach, "see", lambda some, *how: asked.append(len(some)) or real(some, *how))
+    assert median_reach(means, np.eye(4), K, (100, 100)) == pytest.approx(5.0, abs=0.05)
+    assert asked[0] <= 1000
 
 
 def _angle(a: Rotation, b: Rotation) -> float:

@@ -23,7 +23,7 @@ from langflash_core.scene.doubts import doubtful, told_warnings
 from langflash_core.scene.edits import History, Marks
 
 from ..commands import Command, ShowPicture
-from ..governor import Around
+from ..governor import LEAST_OF_HUGE, Around
 from ..requests import Asked, Job, SceneTask, Task
 from . import unfinished
 from .commands import (
@@ -265,7 +265,7 @@ class Thin(SceneTask):
 
 @dataclass(frozen=True)
 class ThinAround(SceneTask):
-    """The same of a huge scene: fine around the eye, and the coarser the farther away."""
+    """The same of a huge scene: fine around the eye, coarser the farther away; then fewer of these."""
 
     newest_counts = True
 
@@ -284,6 +284,8 @@ class ThinAround(SceneTask):
         thinned, rows, reach = thinner.around(np.array(self.eye), self.share)
         fewer = Fewer(thinned, rows, Drawable.of(thinned))
         yield Thinned(scene, self.share, fewer, Around(self.eye, reach))
+        least, some, _ = Thinner(thinned).around(np.array(self.eye), LEAST_OF_HUGE)
+        yield Thinned(scene, self.share * LEAST_OF_HUGE, Fewer(least, rows[some], Drawable.of(least)))
 
 
 @dataclass(frozen=True)

@@ -363,8 +363,8 @@ def test_of_a_huge_scene_only_a_share_is_brought_to_opengl_on_the_processor(view
     other = room(torch.eye(3, 384))
     viewport.thin(other, share, Thinned(*thin_with_rows(other, share)))  # of a scene that was there before
     assert viewport.picture is None and viewport.drawn is None
-    (made,) = ThinAround(1, SceneMemory(scene), share, eye).run(lambda: False)
-    assert isinstance(made, show.Thinned)
+    made, fewer = ThinAround(1, SceneMemory(scene), share, eye).run(lambda: False)
+    assert isinstance(made, show.Thinned) and isinstance(fewer, show.Thinned)
     viewport.thin(made.scene, made.share, made.thinned, made.around)
     picture = viewport.picture
     assert picture is not None and picture.easel.asked.keys == (0,) and viewport.shares == ()
@@ -379,13 +379,16 @@ def test_of_a_huge_scene_only_a_share_is_brought_to_opengl_on_the_processor(view
         time.sleep(0.01)
     live = viewport._made()._scene
     assert live is not None and {*live._levels} == {share}
+    viewport.thin(fewer.scene, fewer.share, fewer.thinned, fewer.around)
+    assert viewport.picture is not None and viewport.picture.governor.ladder[-1] == (0.25, share / 4)
+    assert {*live._levels} == {share, share / 4} and {*fewer.thinned.rows} <= {*made.thinned.rows}
     moved = {plan.share for plan in plans[:20] if plan is not None}
     assert moved == {share} and plans[-1] is not None and plans[-1].share == 1
     # From far away other ones are chosen; the picture at rest stays, and the next that moves has them.
     assert made.around is not None and viewport.share_around(eye) is None
     far = Vector(eye.x, eye.y, eye.z - made.around.reach)
     assert viewport.share_around(far) == share
-    (other,) = ThinAround(1, SceneMemory(scene), share, far).run(lambda: False)
+    other, _ = ThinAround(1, SceneMemory(scene), share, far).run(lambda: False)
     assert isinstance(other, show.Thinned)
     shown, level = viewport.drawn, live.level(share)
     viewport.thin(other.scene, other.share, other.thinned, other.around)
