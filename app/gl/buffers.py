@@ -6,7 +6,7 @@ import numpy as np
 
 def buffer_of(ctx: moderngl.Context, values: np.ndarray) -> moderngl.Buffer:
     """One that holds an array; of an empty one it has room for a number, since OpenGL has none of no size."""
-    return ctx.buffer(np.ascontiguousarray(values).tobytes() or bytes(4))
+    return ctx.buffer(np.ascontiguousarray(values) if values.size else bytes(4))
 
 
 class Growing:

@@ -53,14 +53,11 @@ class Carried:
 class CarriedTextures:
     """Owns the same as textures; `ready` sets up the program that expands some atoms' weights."""
 
-    def __init__(self, ctx: moderngl.Context, programs: Programs, carried: Carried):
+    def __init__(self, ctx: moderngl.Context, programs: Programs, carried: Carried, texels: np.ndarray):
+        """texels: of `texels_of` what is carried."""
         self._programs = programs
         self._a_gaussian = carried.ids.shape[1]
-        pairs = np.stack((carried.ids.astype(np.float32), carried.values), -1).reshape(-1, 2)
-        rows = max(1, -(-len(pairs) // _ROW_TEXELS))
-        padded = np.zeros((rows * _ROW_TEXELS, 2), np.float32)
-        padded[: len(pairs)] = pairs
-        self._sparse = ctx.texture((_ROW_TEXELS, rows), 2, padded.tobytes(), dtype="f4")
+        self._sparse = ctx.texture(texels.shape[1::-1], 2, texels, dtype="f4")
         self._sparse.filter = (moderngl.NEAREST, moderngl.NEAREST)
         self._slots = ctx.texture((max(1, carried.num_atoms), 1), 1, dtype="f4")
 
@@ -85,6 +82,15 @@ class CarriedTextures:
     def release(self) -> None:
         self._slots.release()
         self._sparse.release()
+
+
+def texels_of(carried: Carried) -> np.ndarray:
+    """(rows, texels, 2) float32: atoms and weights of one Gaussian after the other."""
+    count = carried.ids.size
+    texels = np.zeros((max(1, -(-count // _ROW_TEXELS)), _ROW_TEXELS, 2), np.float32)
+    pairs = texels.reshape(-1, 2)
+    pairs[:count, 0], pairs[:count, 1] = carried.ids.ravel(), carried.values.ravel()
+    return texels
 
 
 def bytes_of(num_layers: int) -> int:

@@ -12,7 +12,7 @@ from langflash_core.splat.projection import ALPHA_MIN, drawable_rows
 from langflash_core.types import Camera, Gaussians, Scene
 
 from .buffers import Growing
-from .carried import Carried, CarriedTextures, bytes_of
+from .carried import Carried, CarriedTextures, bytes_of, texels_of
 from .layout import ATOMS_A_LAYER
 from .ordering import Ordering
 from .shapes import PLACE_FLOATS, MakeShapes, Quads
@@ -27,12 +27,14 @@ _WIDEST = 1e12  # scene units: wider Gaussians are flat over any view, and float
 @dataclass(frozen=True)
 class Drawable:
     """What of a scene can be drawn, ready for the card. gaussians: (N,) those, without harmonics; kept:
-    (all,) bool, which of the scene's these are; sh: (all, S, 3), of all; carried: their weights."""
+    (all,) bool, which of the scene's these are; sh: (all, S, 3), of all; carried: their weights; texels: of
+    these (`texels_of`)."""
 
     gaussians: Gaussians
     kept: np.ndarray
     sh: Tensor
     carried: Carried
+    texels: np.ndarray
 
     @staticmethod
     def of(scene: Scene) -> "Drawable":
@@ -41,7 +43,8 @@ class Drawable:
         semantics, rows = scene.semantics, torch.from_numpy(kept)
         values = semantics.weight_values.detach().cpu().float()[rows].numpy()
         carried = Carried(semantics.weight_ids.cpu()[rows].numpy(), values, semantics.num_atoms)
-        return Drawable(gaussians, kept, scene.gaussians.sh.detach().cpu().float(), carried)
+        sh = scene.gaussians.sh.detach().cpu().float()
+        return Drawable(gaussians, kept, sh, carried, texels_of(carried))
 
 
 class SplatBuffers:
@@ -70,7 +73,7 @@ class SplatBuffers:
         self._programs = programs
         self._ordering = Ordering(gaussians.means, gaussians.scales)
         self._vertices = Vertices(ctx, gaussians, own.sh, np.flatnonzero(self._kept))
-        self._textures = CarriedTextures(ctx, programs, self.carried)
+        self._textures = CarriedTextures(ctx, programs, self.carried, own.texels)
         self._order_buffer = ctx.buffer(reserve=4 * max(1, self.num_gaussians))
         self.places = ctx.buffer(reserve=4 * PLACE_FLOATS * max(1, self.num_gaussians))
         self._expanded = Growing(ctx)

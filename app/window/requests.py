@@ -33,11 +33,13 @@ class Task(ABC):
 
     saves: a person asked for it to be written, and the end of the program waits for it.
     newest_counts: a newer one of its kind makes an older one pointless.
+    urgent: a picture waits for it, so it comes before what was asked earlier.
     light: needs nothing that the worker loads first, and is not kept waiting for it.
     """
 
     saves: ClassVar[bool] = False
     newest_counts: ClassVar[bool] = False
+    urgent: ClassVar[bool] = False
     light: ClassVar[bool] = False
 
     @abstractmethod

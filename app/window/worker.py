@@ -142,7 +142,8 @@ class Worker:
         """Run what is queued now, oldest first. light: only what needs nothing loaded."""
         while True:
             with self._changed:
-                task = next((each for each in self._tasks if each.light or not light), None)
+                ready = [each for each in self._tasks if each.light or not light]
+                task = next((each for each in ready if each.urgent), ready[0] if ready else None)
                 self._task = task
                 if task is None:
                     return

@@ -9,7 +9,8 @@ import torch
 from PIL import Image
 
 from langflash_core.language.spaces import language_space
-from langflash_core.scene.atoms import alike_order, atom_pictures, atom_shares
+from langflash_core.scene import atoms
+from langflash_core.scene.atoms import alike_order, atom_pictures, atom_places, atom_shares
 from tests.app.window.scenes import CHAIR, PHRASES, room
 
 
@@ -53,3 +54,14 @@ def test_shares_are_of_the_surface_not_of_the_count(scene) -> None:
     cut = replace(cut, gaussians=replace(cut.gaussians, scales=halved))
     assert 0 < atom_shares(scene)[1] < 1
     np.testing.assert_allclose(atom_shares(cut), atom_shares(scene), rtol=1e-6)
+
+
+def test_some_of_millions_tell_shares_and_places(scene, monkeypatch) -> None:
+    shares, places = atom_shares(scene), atom_places(scene)
+    monkeypatch.setattr(atoms, "_ENOUGH", len(scene.gaussians) // 2 - 1)
+    areas, real = [], atoms.covered_areas
+    monkeypatch.setattr(atoms, "covered_areas", lambda some: areas.append(len(some)) or real(some))
+    np.testing.assert_allclose(atom_shares(scene), shares, atol=0.05)
+    assert 0 < areas[0] < len(scene.gaussians) / 2
+    for some, place in zip(atom_places(scene), places, strict=True):
+        assert some is not None and place is not None and np.allclose(some, place, atol=0.2)

@@ -102,9 +102,7 @@ class SceneEffects(Effects):
             case ChoosePair() if state.scene.choosing and not before.scene.choosing:
                 submit(FindPair(tuple(photo.path for photo in state.scene.photos)))
             case SceneArrived(info, replaces=changed):
-                self._show(info, before.scene.info, changed)
-                for share in self._viewport.shares:
-                    submit(Thin(info.serial, info.scene, share))
+                self._show(info, before.scene.info, changed, state)
             case Thinned(scene, share, thinned, around):
                 with self._told():
                     self._viewport.thin(scene, share, thinned, around)
@@ -118,6 +116,9 @@ class SceneEffects(Effects):
         self._show_whole(before, state)
 
     def after_picture(self, state: State) -> None:
+        self._choose_around(state)
+
+    def _choose_around(self, state: State) -> None:
         """What moves through a huge scene is chosen anew where the camera has come far."""
         info, eye = state.scene.info, state.scene.pose.centre
         share = None if info is None else self._viewport.share_around(eye)
@@ -217,11 +218,14 @@ class SceneEffects(Effects):
         elif drop.scenes and not drop.films:
             perform(Instead((OpenScene(drop.scenes[0], alone=True),)))
 
-    def _show(self, info: SceneInfo, old: SceneInfo | None, changed: bool) -> None:
-        """Bring a scene to the renderer; the worker decodes its photos, of which many take longer than a
-        frame. No photo of the `old` one stays on a button of another's."""
+    def _show(self, info: SceneInfo, old: SceneInfo | None, changed: bool, state: State) -> None:
+        """Bring a scene to the renderer; the worker makes what moves through it, then decodes its photos, of
+        which many take longer than a frame. No photo of the `old` one stays on a button of another's."""
         with self._told():
             self._viewport.set_scene(info.serial, info.scene, changed)
+        self._choose_around(state)
+        for share in self._viewport.shares:
+            self._hands.submit(Thin(info.serial, info.scene, share))
         photos = () if old is None else old.scene.photos
         if photos != info.scene.photos:
             for index in range(len(photos)):

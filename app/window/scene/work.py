@@ -268,6 +268,7 @@ class ThinAround(SceneTask):
     """The same of a huge scene: fine around the eye, coarser the farther away; then fewer of these."""
 
     newest_counts = True
+    urgent = True
 
     memory: SceneMemory = field(repr=False)
     share: float

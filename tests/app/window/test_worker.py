@@ -137,6 +137,28 @@ def test_failures_are_sentences_and_the_thread_lives_on(
     assert isinstance(wait_for(worker, show.SceneArrived)[-1], show.SceneArrived)
 
 
+@dataclass(frozen=True)
+class Urgent(Counting):
+    """A picture waits for it."""
+
+    urgent = True
+
+    def run(self, stopping):
+        yield Kept(torch.ones(3))
+
+
+def test_what_a_picture_waits_for_comes_before_what_was_asked_earlier() -> None:
+    worker = Worker(begins=False)
+    for task in (Counting(), Counting(), Urgent()):
+        worker.submit(task)
+    worker.begin()
+    kept = []
+    while len(kept) < 3:
+        kept += [each.tensor[0].item() for each in wait_for(worker, Kept) if isinstance(each, Kept)]
+    worker.stop()
+    assert kept == [1, 0, 0]
+
+
 def test_only_the_newest_prompts_are_encoded(worker: Worker, scene_file: Path) -> None:
     scene = load(scene_file)
     typed = "an armchair by the window"
