@@ -127,6 +127,20 @@ def intrinsics(pose: Pose, width: int, height: int) -> Float[np.ndarray, "3 3"]:
     return np.array([[focal, 0.0, centre_x], [0.0, focal, centre_y], [0.0, 0.0, 1.0]])
 
 
+def of_picture(pose: Pose, width: float, height: float) -> Pose:
+    """The pose whose box is all of a picture, so many pixels wide and high, that holds this one's box; as it
+    is where it sees by parallel rays."""
+    if pose.span is not None:
+        return pose
+    size = max(round(width), 1), max(round(height), 1)
+    return with_lens(pose, from_view(viewmat(pose), intrinsics(pose, *size), size, pose.reach))
+
+
+def with_lens(pose: Pose, other: Pose) -> Pose:
+    """The pose with the field of view and the box of another."""
+    return replace(pose, fov=other.fov, aspect=other.aspect, shift=other.shift)
+
+
 def viewmat(pose: Pose) -> Float[np.ndarray, "4 4"]:
     """World to camera (4, 4)."""
     matrix = np.eye(4)

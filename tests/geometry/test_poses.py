@@ -284,3 +284,15 @@ def test_what_is_seen_of_a_line_is_what_lies_in_front():
     assert expected is not None and pieces.shape == (2, 2, 2)
     np.testing.assert_allclose(pieces, np.stack((expected[1][:-1], expected[1][1:]), 1))
     assert len(poses.visible(line[:1], pose, (100, 100))) == 0
+
+
+@pytest.mark.parametrize("size", [(640, 400), (300, 500), (417, 311)])
+def test_the_pose_of_a_picture_sees_all_of_it_as_before(size: tuple[int, int]) -> None:
+    for aspect in (0.6, 1.5):
+        pose = replace(poses.orbit(Pose(reach=2.0), 0.4, 0.2), aspect=aspect, shift=(0.05, -0.02))
+        whole = poses.of_picture(pose, *size)
+        assert whole.aspect == size[0] / size[1] and whole.axes.tolist() == pose.axes.tolist()
+        np.testing.assert_allclose(poses.intrinsics(whole, *size), poses.intrinsics(pose, *size), rtol=1e-9)
+        assert poses.with_lens(whole, pose) == pose
+        flat = replace(pose, span=3.0)
+        assert poses.of_picture(flat, *size) == flat
