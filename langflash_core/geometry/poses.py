@@ -2,8 +2,9 @@
 
 Conventions of the core: OpenCV axes, world = camera of view 0, quaternions wxyz. Up is -y, because view 0
 was held roughly level, where nobody knows better (`langflash_core.base.records.World`). A pose frames a *box*
-with the shape of the photos inside a panel of any shape: the box always fits, so an input view shows all of
-its photo.
+with the shape of the photos inside a panel of any shape. In a wider one it is out of sight above and below by
+as much as it leaves bars aside: whole, an upright photo stands between black bars, and without bars it loses
+most of its height. By parallel rays, and in a narrower panel, all of it shows.
 
 A pose with a `span` sees by parallel rays (orthographic). It stands clear of the scene, since what is
 behind it is not drawn: how large things are follows from the span, not from where it stands.
@@ -30,6 +31,8 @@ NEAREST = 0.02  # scene units in front of the camera from which something is mar
 MIN_POLE_DEGREES = 4.0  # how near to straight up or down an orbit may come
 FOV_RANGE = (15.0, 120.0)
 FRAME_MARGIN = 1.08  # around what is framed
+MAGNIFIED = 1.6  # that a photo is at the most, in a picture wider than it
+FRAMED_IN = 1.6  # width / height of the picture in which what is framed shows whole: a window's
 NEAR = 45.0  # degrees aside of the photos to which a look along an axis keeps
 STAY, FLIGHT = 1.5, 2.5  # seconds at a stop of a tour, and to the next one
 
@@ -116,15 +119,36 @@ def from_view(
 
 
 def intrinsics(pose: Pose, width: int, height: int) -> Float[np.ndarray, "3 3"]:
-    """K (3, 3) in pixels of a width x height picture that holds the pose's whole box; with a span, focal
-    lengths in pixels per scene unit."""
-    box_width = min(width, height * pose.aspect)
-    box_height = box_width / pose.aspect
+    """K (3, 3) in pixels of a width x height picture around the pose's box; with a span, focal lengths in
+    pixels per scene unit."""
+    box_width, box_height = box_in(pose, width, height)
     longer = max(box_width, box_height)
     focal = 0.5 * longer / math.tan(math.radians(pose.fov) / 2) if pose.span is None else longer / pose.span
     centre_x = width / 2 + pose.shift[0] * box_width
     centre_y = height / 2 + pose.shift[1] * box_height
     return np.array([[focal, 0.0, centre_x], [0.0, focal, centre_y], [0.0, 0.0, 1.0]])
+
+
+def box_in(pose: Pose, width: float, height: float) -> tuple[float, float]:
+    """Width and height of the pose's box in a picture so wide and high, around its middle."""
+    box_width = min(width, height * pose.aspect)
+    if pose.span is None:  # halfway between all of it and no bars, as on exported pages
+        box_width *= min(math.sqrt(width / box_width), MAGNIFIED)
+    return box_width, box_width / pose.aspect
+
+
+def of_picture(pose: Pose, width: float, height: float) -> Pose:
+    """The pose whose box is all of a picture, so many pixels wide and high, of this one; as it is where it
+    sees by parallel rays."""
+    if pose.span is not None:
+        return pose
+    size = max(round(width), 1), max(round(height), 1)
+    return with_lens(pose, from_view(viewmat(pose), intrinsics(pose, *size), size, pose.reach))
+
+
+def with_lens(pose: Pose, other: Pose) -> Pose:
+    """The pose with the field of view and the box of another."""
+    return replace(pose, fov=other.fov, aspect=other.aspect, shift=other.shift)
 
 
 def viewmat(pose: Pose) -> Float[np.ndarray, "4 4"]:
@@ -332,6 +356,7 @@ def framing(pose: Pose, low: Vector, high: Vector) -> Pose:
         return _clear(there, low, high)
     half = math.tan(math.radians(pose.fov) / 2)
     half_x, half_y = (half, half / pose.aspect) if pose.aspect >= 1 else (half * pose.aspect, half)
+    half_y /= max(box_in(pose, FRAMED_IN, 1.0)[1], 1.0)
     needed = np.maximum(abs(offsets[:, 0]) / half_x, abs(offsets[:, 1]) / half_y) - offsets[:, 2]
     reach = max(float(FRAME_MARGIN * needed.max()), MIN_REACH)
     centre = middle - reach * pose.axes[:, 2]

@@ -328,6 +328,8 @@ class Surroundedness:
     aside: float = math.cos(math.radians(60.0))
     """Degrees between camera and photo, at a surface, up to which it counts as seen: there a picture has
     faded to the half (langflash_core/scene/trust.py)."""
+    close: float = 1.1
+    """Times the depth of what is seen from aside, up to which what is seen well is not hidden by it."""
     cells: tuple[int, int] = (16, 12)
     """Of a picture, of which it is asked whether they show something."""
     levels: int = 5

@@ -72,8 +72,11 @@ def test_a_view_comes_back_as_its_own_camera() -> None:
 
 @pytest.mark.parametrize("size", [(900, 300), (300, 900), (640, 480)])
 @pytest.mark.parametrize("photo", [(224, 168), (168, 224)])
-def test_the_whole_photo_fits_any_panel(size: tuple[int, int], photo: tuple[int, int]) -> None:
-    """The photo's corners lie inside the panel, and touch it on one axis."""
+def test_a_photo_fits_a_narrow_panel_and_a_wide_one_halfway(
+    size: tuple[int, int], photo: tuple[int, int]
+) -> None:
+    """In a narrower panel it touches both sides; in a wider one it is out of sight above and below by as much
+    as it leaves bars aside, both in shares, or magnified by 1.6."""
     K = np.array([[190.0, 0, photo[0] / 2], [0, 190.0, photo[1] / 2], [0, 0, 1]])
     pose = poses.from_view(np.eye(4), K, photo, 1.0)
     camera = poses.to_camera(pose, *size)
@@ -81,9 +84,27 @@ def test_the_whole_photo_fits_any_panel(size: tuple[int, int], photo: tuple[int,
     corners = torch.tensor([[-half[0], -half[1], 1.0], [half[0], half[1], 1.0]])
     pixels = seen_at(transform(camera.viewmat, corners), camera.K)
     (left, top), (right, bottom) = pixels.tolist()
-    slack = 1e-2  # pixels; float32 at 900 pixels
-    assert left >= -slack and top >= -slack and right <= size[0] + slack and bottom <= size[1] + slack
-    assert abs(left) < slack or abs(top) < slack
+    across, along = (right - left) / size[0], (bottom - top) / size[1]
+    slack = 1e-4  # float32
+    ratio = size[0] / size[1] * photo[1] / photo[0]
+    if ratio <= 1:
+        assert across == pytest.approx(1, abs=slack) and along < 1 + slack
+    else:
+        assert along == pytest.approx(min(1 / across, 1.6), abs=slack)
+        assert along / across == pytest.approx(ratio)
+    assert left + right == pytest.approx(size[0], abs=0.1) and top + bottom == pytest.approx(size[1], abs=0.1)
+    box = poses.box_in(pose, *size)
+    assert box == pytest.approx((right - left, bottom - top), rel=slack)
+
+
+@pytest.mark.parametrize("aspect", [4 / 3, 3 / 4, 9 / 16])
+def test_what_is_framed_shows_whole_in_a_window(aspect: float) -> None:
+    pose = poses.framing(poses.orbit(Pose(reach=0.5, aspect=aspect), 0.7, 0.3), LOW, HIGH)
+    corners = np.array([[x, y, z] for x in (LOW.x, HIGH.x) for y in (LOW.y, HIGH.y) for z in (LOW.z, HIGH.z)])
+    for size in ((1280, 800), (round(800 * aspect), 800)):
+        found = poses.project(corners, pose, size)
+        assert found is not None
+        assert (found[1] > 0).all() and (found[1] < size).all()
 
 
 def test_blend_is_exact_at_the_ends_and_steady_between() -> None:
@@ -284,3 +305,15 @@ def test_what_is_seen_of_a_line_is_what_lies_in_front():
     assert expected is not None and pieces.shape == (2, 2, 2)
     np.testing.assert_allclose(pieces, np.stack((expected[1][:-1], expected[1][1:]), 1))
     assert len(poses.visible(line[:1], pose, (100, 100))) == 0
+
+
+@pytest.mark.parametrize("size", [(640, 400), (300, 500), (417, 311)])
+def test_the_pose_of_a_picture_sees_all_of_it_as_before(size: tuple[int, int]) -> None:
+    for aspect in (0.6, 1.5):
+        pose = replace(poses.orbit(Pose(reach=2.0), 0.4, 0.2), aspect=aspect, shift=(0.05, -0.02))
+        whole = poses.of_picture(pose, *size)
+        assert whole.aspect == size[0] / size[1] and whole.axes.tolist() == pose.axes.tolist()
+        np.testing.assert_allclose(poses.intrinsics(whole, *size), poses.intrinsics(pose, *size), rtol=1e-9)
+        assert poses.with_lens(whole, pose) == pose
+        flat = replace(pose, span=3.0)
+        assert poses.of_picture(flat, *size) == flat

@@ -78,6 +78,45 @@ def test_a_photos_own_picture_is_known_and_what_is_behind_it_is_not(scene: Scene
         assert 0.4 < around.known(half) < 0.75
 
 
+def strip_beside(wall: Surroundings) -> Surroundings:
+    """The wall, and before it what a photo at the origin saw along its own way: a surface at 0.5 to the right
+    that runs into the depth. Its samples are of view 5."""
+    y, z = (grid.ravel() for grid in np.meshgrid(np.arange(-2, 2, SPACING), np.arange(0.5, 1.5, SPACING)))
+    places = np.stack((np.full(len(y), 0.5), y, z), 1)
+    count = len(wall.places) + len(places)
+    return replace(
+        wall,
+        places=np.concatenate((wall.places, places)),
+        eyes=np.zeros((count, 3)),
+        sizes=np.full(count, SPACING),
+        rows=np.arange(count),
+        views=np.concatenate((0 * wall.views, np.full(len(places), 5))),
+    )
+
+
+def test_what_is_seen_from_far_aside_hides_what_lies_behind_it(wall: Surroundings) -> None:
+    """From the right, where the photo's surface turns its back, the wall behind it is no longer seen."""
+    both, there = strip_beside(wall), Pose(Vector(1.5, 0.0, 0.5), fov=40.0)
+    across = poses.facing(replace(there, reach=1.0), Vector(-1.0, 0.0, 0.8))
+    across = replace(across, centre=there.centre)
+    assert wall.known(across) > 0.9 and both.known(across) < 0.5
+    ahead = Pose(fov=20.0)
+    assert wall.known(ahead) == both.known(ahead) == 1
+
+
+def test_what_one_of_several_layers_hides_the_others_show(wall: Surroundings) -> None:
+    """As it does in the picture, which blends layers by what they agree about."""
+    both, here = strip_beside(wall), Vector(1.5, 0.0, 0.5)
+    across = replace(poses.facing(Pose(here, reach=1.0, fov=40.0), Vector(-1.0, 0.0, 0.8)), centre=here)
+    turned = across.axes[:, 2]
+    many = np.where(both.views == 5, 5, np.arange(len(both.views)) % 3)
+    at = np.tile(np.array(here), (6, 1)) + np.array([[0, 0, 0.01 * n] for n in (0, 0, 0, 9, 9, 1)])
+    layers = Nearness(at, np.tile(turned, (6, 1)), FAR, tuple(range(6)))
+    assert replace(both, views=many, layers=layers).known(across) > 0.9
+    alone = Nearness(at[5:], np.tile(turned, (1, 1)), FAR, (5,))
+    assert replace(both, views=many, layers=alone).known(across) == 0
+
+
 def test_of_layers_those_that_a_picture_shows_are_known(wall: Surroundings) -> None:
     """As the renderer chooses them: six photos in a row, of which the left half saw the wall."""
     at = np.stack((np.arange(6.0), np.zeros(6), np.zeros(6)), 1)

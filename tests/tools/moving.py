@@ -8,10 +8,13 @@ pixels in eight directions, on the window's own picture with its own commands an
 
     unseen    share of the picture where no surface is (alpha below .5), mean over places and directions
     black     the same of the picture as the window shows it, which fills what is beside surfaces and fades:
-              share that is darker than half were all surfaces white
+              share that is darker than half were all surfaces white; at 0 pixels it is what is beside the
+              photos from the start, as beside upright ones in this wide window
+    added     of that, what the drag brought
     lost      share of drags after which half of the picture is black that was not before
-    inside    share of drags after which a surface is nearer than a tenth of the scene's depth, or such
-              surfaces cover a fifth of the picture
+    inside    share of drags after which a surface of a layer that the picture shows is nearer than a tenth of
+              the scene's depth, or such surfaces cover a fifth of the picture; layers of photos far away are
+              not drawn
     turned    degrees, mean;  moved: of the scene's depth, mean
 """
 
@@ -48,6 +51,7 @@ from app.window.viewport import Viewport
 from langflash_core.base.graphics import offscreen_context
 from langflash_core.geometry import poses
 from langflash_core.geometry.harmonics import colour_to_sh
+from langflash_core.geometry.nearness import Nearness
 from langflash_core.geometry.poses import Pose
 from langflash_core.scene.thin import thin_with_rows
 from langflash_core.types import Scene
@@ -155,21 +159,27 @@ class Judge:
         self._renderer, self._white = moving_renderer(ctx), moving_renderer(ctx)
         self._renderer.set_scene(scene)
         self._white.set_scene(whitened(scene))
-        solid = scene.gaussians.opacities > SHOWN
-        self._surfaces = KDTree(scene.gaussians.means[solid].double().numpy())
+        self._layers = Nearness.of(scene) if scene.layered else None
+        views = (None,) if self._layers is None else self._layers.views
+        self._surfaces = {view: surfaces(scene if view is None else scene.layer(view)) for view in views}
         self._near = NEAR * depth
 
     def seen(self, pose: Pose) -> Seen:
         camera = poses.to_camera(pose, *JUDGED)
         white = self._white.colours(camera, fade=True, fill=True)
-        self._renderer.draw(camera, weight_maps=False)
-        frame = self._renderer.frame()
+        self._white.draw(camera, weight_maps=False)
+        frame = self._white.frame()
         shown = frame.alphas >= SHOWN
         covered = (shown & (frame.depths < self._near)).double().mean().item()
-        nearest = self._surfaces.query(np.array(pose.centre))[0]
         black = float((white.max(2) < SHOWN * 255).mean())
-        inside = bool(covered > COVERED or nearest < self._near)
+        inside = covered > COVERED or self._nearest(pose) < self._near
         return Seen(1 - shown.double().mean().item(), black, inside)
+
+    def _nearest(self, pose: Pose) -> float:
+        """Distance of the nearest surface, of those layers that the picture shows."""
+        place = np.array(pose.centre)
+        views = (None,) if self._layers is None else self._layers.seen(place, pose.axes[:, 2]).views
+        return min(float(self._surfaces[view].query(place)[0]) for view in views)
 
     def keep(self, pose: Pose, folder: Path | None, name: str) -> None:
         """The picture from a pose as the window shows it, in a folder, if there is one."""
@@ -177,6 +187,12 @@ class Judge:
             camera = poses.to_camera(pose, WINDOW[0] // 2, WINDOW[1] // 2)
             picture = self._renderer.colours(camera, fade=True, fill=True)
             Image.fromarray(picture).save(folder / f"{name}.png")
+
+
+def surfaces(scene: Scene) -> KDTree:
+    """Places of what is solid."""
+    gaussians = scene.gaussians
+    return KDTree(gaussians.means[gaussians.opacities > SHOWN].double().numpy())
 
 
 def whitened(scene: Scene) -> Scene:
@@ -237,14 +253,15 @@ def table(name: str, drags: Sequence[Drag]) -> Iterator[str]:
         for pixels in (0, *DRAGS):
             some = [drag for drag in (*stood, *drags) if (drag.at_photo, drag.pixels) == (at_photo, pixels)]
             lost = float(np.mean([drag.before.black <= LOST < drag.after.black for drag in some]))
+            added = float(np.mean([drag.after.black - drag.before.black for drag in some]))
             unseen, black, inside, turned, moved = (
                 float(np.mean(numbers))
                 for numbers in zip(*((*vars(d.after).values(), d.turned, d.moved) for d in some), strict=True)
             )
             where = "photos" if at_photo else "between"
             yield (
-                f"| {name} | {where} | {pixels} | {unseen:.1%} | {black:.1%} | {lost:.1%} | {inside:.1%} "
-                f"| {turned:.1f} | {moved:.3f} |"
+                f"| {name} | {where} | {pixels} | {unseen:.1%} | {black:.1%} | {added:+.1%} | {lost:.1%} "
+                f"| {inside:.1%} | {turned:.1f} | {moved:.3f} |"
             )
 
 
@@ -256,8 +273,8 @@ def main(arguments: Sequence[str]) -> int:
     asked = parser.parse_args(arguments)
     scenes = {path.stem: path for path in asked.scenes} or {"a room made here": None}
     ctx = offscreen_context()
-    head = "| scene | at | pixels | unseen | black | lost | inside | turned | moved |"
-    sys.stdout.write(f"{head}\n|{'---|' * 9}\n")
+    head = "| scene | at | pixels | unseen | black | added | lost | inside | turned | moved |"
+    sys.stdout.write(f"{head}\n|{'---|' * 10}\n")
     for name, path in scenes.items():
         shots = None if asked.shots is None else asked.shots / name
         if shots is not None:

@@ -3,6 +3,7 @@
 import math
 from collections.abc import Callable
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 from jaxtyping import Bool
@@ -21,11 +22,12 @@ RIGHTING = math.radians(15.0)
 """Of turning, within which most of a photo's roll is gone."""
 ASLANT = math.radians(2.0)  # of a photo's roll, which one sees
 AT_PHOTO = 0.005  # of the distance to what a photo looks at: so near to its place one stands there
-ENOUGH, LEAST = 0.9, 0.7
-"""Of a picture, known: a move that leads to less than enough slows down, and stops at the least."""
+ENOUGH, LEAST = 0.95, 0.8
+"""Of what a picture shows at the nearest photo's place: a move that leads to less than enough slows down, and
+stops at the least."""
 UNHURRIED = 0.25  # pace of keys and wheel where a drag stops: each press, each notch is meant
 TURN_PART = math.radians(3.0)  # of a move that is judged at once
-MOST_PARTS = 40  # of one frame's move: some 20 ms
+MOST_PARTS = 40  # of one frame's move: some 40 ms
 PUSHES = 3  # out of surfaces, one after the other, as in a corner
 TOUCHING = 1e-3  # of the way that is kept clear, by which they may err
 FADING = 30.0  # degrees aside from which the picture fades: `FULL` of langflash_core/scene/trust.py
@@ -181,11 +183,11 @@ def held(
     if around is None:
         return whole, 1.0
     parts, done = _parts(pose, whole, around), 0.0
-    known = around.known(pose)
+    known, usual = around.known(pose), _usual(state, pose, around)
     for _ in range(parts):
         after = move(pose, 1 / parts)
         there = around.known(after)
-        share = _pace(known, there, least)
+        share = 1.0 if there >= known else _pace(there / max(usual(after), 1e-9), least)
         moved = _beside(around, pose, after if share == 1 else move(pose, share / parts))
         if share == 0 or moved is None:
             break
@@ -202,11 +204,23 @@ def _parts(pose: Pose, whole: Pose, around: Surroundings) -> int:
     return min(max(1, math.ceil(way), math.ceil(turn)), MOST_PARTS)
 
 
-def _pace(before: float, after: float, least: float) -> float:
-    """Share of a move after which so much of the picture is known, and was before."""
-    if after >= min(before, ENOUGH):
-        return 1.0
-    return min(max((after - LEAST) / (ENOUGH - LEAST), least), 1.0)
+def _usual(state: State, lens: Pose, around: Surroundings) -> Callable[[Pose], float]:
+    """Says what share of a picture, through a pose's lens, is known at the photo's place that is nearest to
+    another pose: beside an upright photo a wide window shows what no photo saw."""
+    views = [] if state.scene.info is None else list(state.scene.info.views)
+    known = cache(lambda view: around.known(poses.with_lens(view, lens)))
+
+    def usual(pose: Pose) -> float:
+        if not views:
+            return 1.0
+        return known(min(views, key=lambda view: math.dist(view.centre, pose.centre)))
+
+    return usual
+
+
+def _pace(known: float, least: float) -> float:
+    """Share of a move after which less is known than before: so much of what is at a photo's place."""
+    return min(max((known - LEAST) / (ENOUGH - LEAST), least), 1.0)
 
 
 def _beside(around: Surroundings, before: Pose, after: Pose) -> Pose | None:

@@ -162,9 +162,9 @@ def frustum(pose: Pose) -> np.ndarray:
 
 
 def photo_box(pose: Pose, size: tuple[float, float]) -> tuple[float, float, float, float]:
-    """(left, top, right, bottom) of the photo in a picture of `size`, from its upper left corner."""
-    width = min(size[0], size[1] * pose.aspect)
-    height = width / pose.aspect
+    """(left, top, right, bottom) of the photo in a picture of `size`, from its upper left corner; above and
+    below it may reach beyond."""
+    width, height = poses.box_in(pose, *size)
     left, top = (size[0] - width) / 2, (size[1] - height) / 2
     return left, top, left + width, top + height
 
@@ -177,9 +177,11 @@ def _compare(state: State, look: Look, corner: ImVec2, size: ImVec2) -> list[do.
         return []
     left, top, right, bottom = photo_box(state.scene.pose, (size.x, size.y))
     x = left + place * (right - left)
+    above = max(-top, 0.0) / max(bottom - top, 1)  # of the photo, out of sight, and as much below
     canvas = imgui.get_window_draw_list()
-    low, high = ImVec2(corner.x + x, corner.y + top), ImVec2(corner.x + right, corner.y + bottom)
-    canvas.add_image(picture[0], low, high, ImVec2(place, 0), ImVec2(1, 1))
+    low = ImVec2(corner.x + x, corner.y + max(top, 0.0))
+    high = ImVec2(corner.x + right, corner.y + min(bottom, size.y))
+    canvas.add_image(picture[0], low, high, ImVec2(place, above), ImVec2(1, 1 - above))
     canvas.add_line(low, ImVec2(low.x, high.y), widgets.u32(theme.DARK.ACCENT), look.px(2))
     middle, radius = ImVec2(low.x, (low.y + high.y) / 2), look.px(_HANDLE)
     canvas.add_circle_filled(middle, radius, widgets.u32(theme.DARK.ACCENT))

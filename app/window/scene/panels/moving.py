@@ -43,13 +43,14 @@ def draw(state: State, look: Look, corner: ImVec2, size: ImVec2) -> list[Command
     if imgui.is_item_activated():
         issued.append(camera.TakeHold(widgets.pointer(corner), orbits=io.key_alt))
     start = state.scene.pose
+    state = state.with_scene(pose=poses.of_picture(start, size.x, size.y))  # it is judged as one sees it
     pose, refused = _dragged(state, look, size)
     if imgui.is_item_hovered() and (io.mouse_wheel or io.mouse_wheel_h):
         if io.key_ctrl and state.editing.tool is Tool.PICK and state.editing.reached is not None:
             issued.append(things.StepLevel(round(math.copysign(1, io.mouse_wheel))))
         else:
             pose = _scrolled(pose, state, look, size)
-    pose = walked(state, pose)
+    pose = poses.with_lens(walked(state, pose), start)
     if refused:
         issued.append(camera.Pull(pose, refused / look.scale))
     elif pose != start:
