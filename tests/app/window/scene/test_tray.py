@@ -19,12 +19,11 @@ from app.window.recovery.preferences import PANEL_WIDTHS
 from app.window.scene import commands as show
 from app.window.scene.lenses import found_lens, places
 from app.window.scene.panels import tray
-from app.window.scene.state import PAUSED, Job, Photo, SceneInfo, said
+from app.window.scene.state import _SAID, PAUSED, Job, Photo, SceneInfo, said
 from app.window.scene.work import describe_scene
 from app.window.state import State
 from langflash_core.base.records import FoundLens
 from langflash_core.geometry.cameras import intrinsics_from_fov
-from langflash_core.reconstruction.stages import STAGES
 from tests.app.window import headless
 from tests.app.window.items import Items
 from tests.app.window.rows import Rows, clipped
@@ -36,7 +35,7 @@ __all__ = ["items"]  # a fixture
 FEW, MANY = tuple(Path(f"/p/{k}.jpg") for k in range(2)), tuple(Path(f"/p/{k}.jpg") for k in range(5))
 
 
-@pytest.mark.parametrize("stage", STAGES)
+@pytest.mark.parametrize("stage", sorted(_SAID))
 def test_what_is_being_done_is_told_in_whole_words(monkeypatch, stage: str) -> None:
     """Beside the buttons and the time that is left "sharpening edges ..." was "sh..."."""
     long = f"{stage}: photo 128 of 300"
