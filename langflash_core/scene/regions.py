@@ -22,7 +22,8 @@ where no two come nearer to a third by being joined (Bruynooghe 1978), so nearly
 Sizes: N Gaussians, V photos, H W pixels of a grid, K atoms, n nodes, k regions, m pairs, t regions of a tree.
 """
 
-from collections.abc import Iterator
+import math
+from collections.abc import Generator, Iterator
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -103,6 +104,15 @@ class Regions:
         return found
 
     @cached_property
+    def counts(self) -> Integer[np.ndarray, " t"]:
+        """How many Gaussians are of each region."""
+        own = np.bincount(self.leaves[self.leaves >= 0], minlength=len(self.parents)).tolist()
+        for region, parent in enumerate(self.parents.tolist()):  # parents come later
+            if parent >= 0:
+                own[parent] += own[region]
+        return np.array(own)
+
+    @cached_property
     def parts(self) -> Integer[np.ndarray, "j 2"]:
         """The two regions that each one is joined of that is no leaf."""
         some = np.flatnonzero(self.parents >= 0)
@@ -154,11 +164,11 @@ class Regions:
         """The first region of a way and what it is part of, each clearly larger than the one before, and no
         larger than people follow: (k,) leaves."""
         low, high = REGIONS.steps
-        most = REGIONS.all * self.sizes[self.parents < 0].sum()
+        most = REGIONS.all * self.counts[self.parents < 0].sum()
         levels, above = [self._leaves_of(way[0])], self._above([way[0]], np.zeros(len(self.parents), bool))
-        sizes, lives = self.sizes[way], self._lives(way)
+        sizes, lives = self.counts[way], self._lives(way)
         while True:
-            size = self.sizes[: len(self.atoms)][levels[-1]].sum()
+            size = self.counts[: len(self.atoms)][levels[-1]].sum()
             near = np.flatnonzero((sizes >= low * size) & (sizes <= min(high * size, most)))
             more = None
             if not len(near):
@@ -181,10 +191,10 @@ class Regions:
     def _onward(
         self, inside: Bool[np.ndarray, " k"], above: Bool[np.ndarray, " t"], least: float, most: float
     ) -> Bool[np.ndarray, " k"] | None:
-        """Leaves with what is beside them that they touch most, until they are of some size; None where that
-        is too large. above: the regions that they are part of; those of the new ones are added."""
-        inside, small, came = inside.copy(), self.sizes[: len(self.atoms)], np.flatnonzero(inside)
-        touch, shared = np.zeros((2, len(small)))
+        """Leaves with what is beside them that they touch most, until they are so many Gaussians; None where
+        that is too large. above: the regions that they are part of; those of the new ones are added."""
+        inside, small, came = inside.copy(), self.counts[: len(self.atoms)], np.flatnonzero(inside)
+        areas, (touch, shared) = self.sizes[: len(small)], np.zeros((2, len(small)))
         while (size := small[inside].sum()) < least:
             touch += self.contacts[came].sum(0)
             room = (most - size) / 2  # the rest is for what other photos show of it
@@ -192,14 +202,14 @@ class Regions:
             if not beside.any():
                 return None
             new = int(beside.argmax())
-            while (up := self.parents[new]) >= 0 and not above[up] and self.sizes[up] <= room:
+            while (up := self.parents[new]) >= 0 and not above[up] and self.counts[up] <= room:
                 new = int(up)
             own = np.flatnonzero(self._leaves_of(new))
             shared += self.overlaps[np.append(came, own)].sum(0)
             inside[own] = True
-            twins = np.flatnonzero((shared >= REGIONS.twin * small) & ~inside)
-            twins = twins[np.argsort(-shared[twins] / small[twins], kind="stable")]
-            twins = twins[small[twins].cumsum() <= most - size - self.sizes[new]]
+            twins = np.flatnonzero((shared >= REGIONS.twin * areas) & ~inside)
+            twins = twins[np.argsort(-shared[twins] / areas[twins], kind="stable")]
+            twins = twins[small[twins].cumsum() <= most - size - self.counts[new]]
             shared += self.overlaps[twins].sum(0)
             inside[twins] = True
             self._above([new, *twins.tolist()], above)
@@ -214,29 +224,34 @@ class Regions:
         return held
 
 
-@torch.no_grad()
 def regions_of(scene: Scene) -> Regions:
     """The tree of a scene. Linear in Gaussians and pixels of all grids."""
-    nodes = _Nodes.of(scene)
+    *_, tree = regions_in_steps(scene)
+    assert isinstance(tree, Regions)
+    return tree
+
+
+@torch.no_grad()
+def regions_in_steps(scene: Scene) -> Iterator[float | Regions]:
+    """The same at the end; before, shares of the work that are done."""
+    nodes = yield from _Nodes.of(scene)
     if not len(nodes.atoms):
         none, zero, alone = np.zeros(0, int), np.zeros(0), csr_array((0, 0))
-        return Regions(nodes.own, none, zero, zero, none, alone, alone)
+        yield Regions(nodes.own, none, zero, zero, none, alone, alone)
+        return
     first, second = nodes.pairs
     near = np.linalg.norm(nodes.colours[first] - nodes.colours[second], axis=1) < REGIONS.shade
     same = near & (nodes.atoms[first] == nodes.atoms[second]) & (nodes.jumps < 0.5) & nodes.beside
     leaves = _label_components(first[same], second[same], len(nodes.atoms))
     joining = _Joining.of(nodes, leaves, _meaning(scene))
-    (first, second), count = joining.ends, len(joining.sizes)
-    pixels = scene.view_size[0] * scene.view_size[1]
-    both = np.append(first, second), np.append(second, first)
-    meet = [
-        csr_array((np.tile(each / pixels, 2).astype(np.float32), both), (count, count))
-        for each in (joining.borders - joining.jumps + joining.overlaps, joining.overlaps)
-    ]
-    tree = joining.done()
+    (first, second), shape = joining.ends, (len(joining.sizes), len(joining.sizes))
+    both, pixels = (np.append(first, second), np.append(second, first)), math.prod(scene.view_size)
+    lengths = joining.borders - joining.jumps + joining.overlaps, joining.overlaps
+    meet = [csr_array((np.tile(each / pixels, 2).astype(np.float32), both), shape) for each in lengths]
+    tree = yield from joining.done()
     atoms = np.full(int(leaves.max()) + 1, -1)
     atoms[leaves] = nodes.atoms
-    return Regions(np.append(leaves, -1)[nodes.own], *tree, atoms, *meet)
+    yield Regions(np.append(leaves, -1)[nodes.own], *tree, atoms, *meet)
 
 
 def _label_components(first: np.ndarray, second: np.ndarray, count: int) -> Integer[np.ndarray, " n"]:
@@ -275,15 +290,15 @@ class _Nodes:
     beside: Bool[np.ndarray, " m"]
 
     @staticmethod
-    def of(scene: Scene) -> "_Nodes":
-        """Of a scene."""
+    def of(scene: Scene) -> Generator[float, None, "_Nodes"]:
+        """Of a scene; half of the work."""
         means = scene.gaussians.means.detach().cpu()
         finite = torch.isfinite(means).all(1).numpy() & (covered_areas(scene.gaussians) > 0)
         views = np.full(len(means), -1) if scene.view_ids is None else scene.view_ids.cpu().numpy()
-        shown = [
-            _Grid.of(scene, view, finite & (views == view)) for view in np.unique(views[views >= 0]).tolist()
-        ]
-        grids = [grid for grid in shown if len(grid.rows)]
+        grids, seen = list[_Grid](), np.unique(views[views >= 0]).tolist()
+        for number, view in enumerate(seen):
+            yield 0.25 * number / len(seen)
+            grids += [grid for grid in [_Grid.of(scene, view, finite & (views == view))] if len(grid.rows)]
         free = np.flatnonzero(finite & (views < 0))
         pixels = scene.view_size[0] * scene.view_size[1]
         start = len(grids) * pixels
@@ -294,7 +309,10 @@ class _Nodes:
         atoms, colours = strongest_atoms(scene.semantics), _lab(scene)
         front = np.concatenate([*(grid.front.ravel() for grid in grids), free]).astype(np.int64)
         areas = covered_areas(scene.gaussians)[free]
-        links = [*_within(grids, pixels), *_across(scene, grids, pixels), _free(scene, free, start)]
+        links = [*_within(grids, pixels), _free(scene, free, start)]
+        for number, link in enumerate(_across(scene, grids, pixels)):
+            yield 0.25 + 0.25 * number / max(len(grids) * REGIONS.partners, 1)
+            links.append(link)
         first, second, jumps, beside = (np.concatenate(each) for each in zip(*links, strict=True))
         return _Nodes(
             np.where(front >= 0, np.append(atoms, -1)[front], -1),
@@ -522,9 +540,11 @@ class _Joining:
         total *= np.minimum(shares[first], shares[second]) ** REGIONS.size
         return np.where(side | (overlap >= REGIONS.least_overlap), total, np.inf)
 
-    def done(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Parents, heights and sizes of the tree."""
+    def done(self) -> Generator[float, None, tuple[np.ndarray, np.ndarray, np.ndarray]]:
+        """Parents, heights and sizes of the tree; the other half of the work."""
+        most = len(self.sizes)
         while len(self.borders):
+            yield 1 - 0.5 * len(self.sizes) / most
             differences = self.differences()
             pairs = _mutual(self.ends, differences, len(self.sizes))
             if not len(pairs):
