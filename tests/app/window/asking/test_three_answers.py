@@ -171,6 +171,8 @@ def test_the_photo_that_shows_it_is_one_click_away(monkeypatch) -> None:
         return [row.words for row in rows.now() if row.kind == "small_button"]
 
     assert shown(state.with_scene(view=0)) == ["Photo 2 shows it"]
+    read = Prompt(0, "purple wall", score=0.0, photo=1, reading="wall, purple")
+    assert shown(state.with_asking(prompts=(read,)).with_scene(view=0)) == ["Photo 2 shows wall"], "no colour"
     assert shown(state.with_scene(view=1)) == []
     assert shown(state.with_asking(prompts=(Prompt(0, "door", score=0.9, photo=1),))) == []
 
