@@ -128,7 +128,7 @@ def tiled() -> tuple[Scene, np.ndarray]:
     lamp = (abs(v - 30) < 3) & (abs(u - 40) < 3)
     tiles = (v // 5 + u // 5) % 2
     colours = torch.tensor([[0.6, 0.6, 0.6], [0.72, 0.72, 0.72]])[tiles]
-    colours[lamp] = torch.tensor([0.9, 0.8, 0.1])
+    colours[torch.from_numpy(lamp)] = torch.tensor([0.9, 0.8, 0.1])
     points = rays(scene.Ks[0], WIDTH, HEIGHT).reshape(-1, 3) * DEPTHS[WALL]
     gaussians = replace(scene.gaussians, means=points, sh=colour_to_sh(colours)[:, None])
     semantics = replace(scene.semantics, weight_ids=torch.from_numpy(lamp.astype(np.int64))[:, None])
