@@ -148,7 +148,7 @@ def open_window(size: tuple[int, int]):
             raise GraphicsError(f"OpenGL 3.3 is not available here{why}; update the graphics driver")
     finally:
         glfw.ERROR_REPORTING = previous
-    glfw.set_error_callback(lambda code, text: log.warning("glfw %s: %s", code, text_of(text)))
+    glfw.set_error_callback(lambda code, text: log.info("glfw %s: %s", code, text_of(text)))
     glfw.make_context_current(window)
     glfw.swap_interval(1)
     return window

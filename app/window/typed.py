@@ -17,6 +17,8 @@ class TypedEffects(Effects):
         """Tell what is new."""
         if state.dialog is None or not state.dialog.types:
             return
-        there = look_up(state.typed.text, scene=state.dialog is Dialog.SAVE)
+        shown = state.opening.folder if state.dialog.looks else None
+        folder = None if shown is None else shown.path
+        there = look_up(state.typed.text, scene=state.dialog is Dialog.SAVE, folder=folder)
         if there is not state.typed.there:
             self._hands.perform(LookedUp(state.typed.text, there))

@@ -156,6 +156,11 @@ class Listing:
     """Of a photo: what no photo shows so large is no thing of an inventory."""
     least_size: float = 0.05
     """Metres, of the second of a thing's three extents: what is smaller is a crumb or a line."""
+    face: float = 0.06
+    """Metres of depth, twice what fits err: a body that is thinner shows one side of it, and nobody knows how
+    deep it is;"""
+    crumb: float = 0.3
+    """metres of width, below which such a side is no thing."""
     over: float = 0.1
     """Metres over the ceiling, from which on nothing stands in the room: depth there errs with its height."""
     seen: float = 0.0005

@@ -41,6 +41,13 @@ from langflash_core.surface.fused import fused_rows, told_in_layers
 from langflash_core.types import Scene, Segments
 
 OPENINGS = ("door", "window")
+FLAT = frozenset({
+    *OPENINGS, "picture", "mirror", "clock", "calendar", "whiteboard", "dartboard", "tv", "tablet",
+    "keyboard", "curtain", "rug", "mat", "towel", "towel rack", "blanket", "clothes", "hanging clothes",
+    "coat hanger", "switch", "socket", "radiator", "room divider", "book", "newspaper", "tray", "ladder",
+    "broom", "lamp",
+})  # fmt: skip
+"""Kinds that may be as thin as they look."""
 _TURNS = np.radians(np.arange(0.0, 90.0, 3.0))
 
 
@@ -52,7 +59,8 @@ class Thing:
     relevancy of its surface, in (0, 1). place: of its box's middle. size: width and depth on the floor, the
     larger first, and height. turn: degrees of the width from east to north. bottom: height of its lower end
     over the floor. photos: those that show it, the one that shows most first; shares: of their pixels. cut:
-    it goes on beyond the border of every photo that shows it, or nobody knows. rows: (N,) bool.
+    it goes on beyond the border of every photo that shows it, or nobody knows. rows: (N,) bool. thin: of a
+    body photos show one side, so nobody knows its depth.
     """
 
     id: str
@@ -67,6 +75,7 @@ class Thing:
     shares: tuple[float, ...]
     cut: bool
     rows: Bool[np.ndarray, " N"] = field(repr=False, compare=False)
+    thin: bool = False
 
     @property
     def title(self) -> str:
@@ -139,6 +148,7 @@ class Inventory:
     def holds(self, thing: Thing) -> bool:
         """Whether a thing has a size, and a place in the room: not over its ceiling nor under its floor."""
         sized = sorted(thing.size)[1] >= LISTING.least_size * self.metre
+        sized &= not thing.thin or thing.size[0] >= LISTING.crumb * self.metre
         return sized and thing.bottom < self.top and thing.bottom + thing.size[2] > 0
 
     @cached_property
@@ -305,12 +315,12 @@ def _thing(
 ) -> Thing:
     """The thing of some rows of the scene."""
     order = [int(view) for view in np.argsort(-seen, kind="stable") if seen[view] >= LISTING.seen]
-    rows = np.zeros(len(areas), bool)
+    rows, box = np.zeros(len(areas), bool), _box(whole, own, areas)
     rows[own] = True
     return Thing(
-        id, kind, whole.scene.record.thing_names.get(id, ""), sure,
-        *_box(whole, own, areas),
+        id, kind, whole.scene.record.thing_names.get(id, ""), sure, *box,
         tuple(order), tuple(float(seen[view]) for view in order), _is_cut_off(whole, rows, order), rows,
+        kind not in FLAT and box[1][1] < LISTING.face * whole.metre,
     )  # fmt: skip
 
 

@@ -89,7 +89,8 @@ Chosen = tuple[list[Thing], str]
 
 def _looking(things: list[Thing], modifier: Modifier, sight: Sight, head: str) -> Chosen:
     """Things mostly called so; where none is, the one that stands out, as an orange ladder in dim light does;
-    else the parts of them that are."""
+    else the parts of them that are. Crumbs do not count, alone or of a thing: what hangs on a wall makes it
+    no red wall."""
     chroma = np.hypot(sight.colours[:, 1], sight.colours[:, 2])
     if LOOKS[modifier.word].hue and np.quantile(chroma, NARROWING.most_colourful) < NARROWING.grey:
         return things, f"its picture has no colours, so nothing here can be told to be {modifier.word}"
@@ -106,8 +107,9 @@ def _looking(things: list[Thing], modifier: Modifier, sight: Sight, head: str) -
     if others and shares[best] >= max(NARROWING.stands_out, 3 * shares[others].max()):
         return [things[best]], ""
     members = np.zeros(len(sight.areas), bool)
-    for each, own in zip(things, well, strict=True):
-        members[each.rows[own >= 0.5]] = True
+    for row in seen:
+        if (looks := well[row] >= 0.5).mean() >= NARROWING.crumb:
+            members[things[row].rows[looks]] = True
     found = sight.cut(head, members)
     return found, "" if found else f"no {head} here looks {modifier.word}"
 

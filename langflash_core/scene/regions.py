@@ -12,7 +12,9 @@ share of their common border along which depth jumps (where two photos show the 
 the overlap of two that no photo shows side by side, s the smaller one's share of the photos that show it. A
 region's height is the difference that made it, and its border holds from there up to the height of the next
 one. Of the regions around it a click takes the one whose border holds longest, as a ratio, within
-`REGIONS.thing`; somewhat rather one of a single atom, and one that the next is much larger than.
+`REGIONS.thing`; somewhat rather one of a single atom, and one that the next is much larger than. Less and
+more of it goes in steps of `REGIONS.steps`, to the regions in reach whose borders hold longest; where the one
+around is too large for a step, what touches most is added of it, piece by piece.
 
 Pairs that are each other's nearest are joined at once, which gives the same tree as one pair after the other
 where no two come nearer to a third by being joined (Bruynooghe 1978), so nearly the same here.
@@ -20,15 +22,17 @@ where no two come nearer to a third by being joined (Bruynooghe 1978), so nearly
 Sizes: N Gaussians, V photos, H W pixels of a grid, K atoms, n nodes, k regions, m pairs, t regions of a tree.
 """
 
-from collections.abc import Iterator
+import math
+from collections.abc import Generator, Iterator
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import cv2
 import numpy as np
 import torch
 from jaxtyping import Bool, Float, Integer
 from scipy.ndimage import distance_transform_edt
-from scipy.sparse import coo_matrix
+from scipy.sparse import coo_matrix, csr_array
 from scipy.sparse.csgraph import connected_components
 
 from langflash_core.geometry.cameras import invert_rigid, world_points
@@ -59,13 +63,17 @@ class Reach:
 class Regions:
     """The tree. leaves: (N,) the region that each Gaussian is of, -1 of none. parents: (t,) what a region is
     part of, always a later one; -1 of none. heights: (t,), no less than those of its parts. sizes: (t,) sums
-    of shares of photos. atoms: (k,) of the first regions, the leaves; -1 of none."""
+    of shares of photos. atoms: (k,) of the first regions, the leaves; -1 of none. contacts (k, k): along
+    how many pixels leaves meet, without a jump or as two photos show the same place; overlaps (k, k): the
+    latter alone; shares of a photo."""
 
     leaves: Integer[np.ndarray, " N"] = field(repr=False)
     parents: Integer[np.ndarray, " t"] = field(repr=False)
     heights: Float[np.ndarray, " t"] = field(repr=False)
     sizes: Float[np.ndarray, " t"] = field(repr=False)
     atoms: Integer[np.ndarray, " k"] = field(repr=False)
+    contacts: csr_array = field(repr=False)
+    overlaps: csr_array = field(repr=False)
 
     def around(self, seen: Bool[np.ndarray, " N"]) -> Reach | None:
         """What a click can mean that shows some Gaussians; None where they are of nothing.
@@ -80,9 +88,35 @@ class Regions:
         while self.parents[way[-1]] >= 0:
             way.append(int(self.parents[way[-1]]))
         thing = self._thing(way)
-        levels = self._levels(way, thing)
-        joins = np.append(self._steps(levels), len(levels))[self.leaves]
-        return Reach(joins, len(levels), levels.index(way[thing]))
+        less, more = self._less(way[: thing + 1]), self._more(way[thing:])
+        levels = [self._leaves_of(region) for region in less] + more
+        joins = np.full(len(self.atoms) + 1, len(levels))
+        for level in reversed(range(len(levels))):
+            joins[:-1][levels[level]] = level
+        return Reach(joins[self.leaves], len(levels), len(less))
+
+    def _leaves_of(self, region: int) -> Bool[np.ndarray, " k"]:
+        """Which leaves are of a region."""
+        found, count, level = np.zeros(len(self.atoms), bool), len(self.atoms), np.array([region])
+        while len(level):
+            found[level[level < count]] = True
+            level = self.parts[level[level >= count] - count].ravel()
+        return found
+
+    @cached_property
+    def counts(self) -> Integer[np.ndarray, " t"]:
+        """How many Gaussians are of each region."""
+        own = np.bincount(self.leaves[self.leaves >= 0], minlength=len(self.parents)).tolist()
+        for region, parent in enumerate(self.parents.tolist()):  # parents come later
+            if parent >= 0:
+                own[parent] += own[region]
+        return np.array(own)
+
+    @cached_property
+    def parts(self) -> Integer[np.ndarray, "j 2"]:
+        """The two regions that each one is joined of that is no leaf."""
+        some = np.flatnonzero(self.parents >= 0)
+        return some[np.argsort(self.parents[some], kind="stable")].reshape(-1, 2)
 
     def _steps(self, levels: list[int]) -> Integer[np.ndarray, " t"]:
         """Of each region the first level that it is part of; as many as there are, of what is of none."""
@@ -114,33 +148,110 @@ class Regions:
         own = np.bincount(steps[same], self.sizes[:leaves][same], len(way) + 1)[: len(way)]
         return own.cumsum() / self.sizes[way]
 
-    def _levels(self, way: list[int], thing: int) -> list[int]:
-        """Regions of the way, the chosen one among them, each clearly larger than the one before."""
-        whole = self.sizes[self.parents < 0].sum()
-        levels = [way[thing]]
-        for region in reversed(way[:thing]):
-            if self.sizes[region] * REGIONS.steps <= self.sizes[levels[0]]:
-                levels.insert(0, region)
-        for region in way[thing + 1 :]:
-            if REGIONS.all * whole >= self.sizes[region] >= REGIONS.steps * self.sizes[levels[-1]]:
-                levels.append(region)
-        return levels
+    def _less(self, way: list[int]) -> list[int]:
+        """Parts of the last region of a way, the smallest first, each clearly smaller than the next one."""
+        low, high = REGIONS.steps
+        sizes, found = self.sizes[way], [len(way) - 1]
+        while True:
+            shares = sizes[: found[0]] / sizes[found[0]]
+            some = np.flatnonzero((shares * low <= 1) & (sizes[: found[0]] >= REGIONS.least_thing))
+            if not len(some):
+                return [way[place] for place in found[:-1]]
+            near = some[shares[some] * high >= 1]
+            found.insert(0, int(near[self._lives(way)[near].argmax()] if len(near) else some[-1]))
+
+    def _more(self, way: list[int]) -> list[Bool[np.ndarray, " k"]]:
+        """The first region of a way and what it is part of, each clearly larger than the one before, and no
+        larger than people follow: (k,) leaves."""
+        low, high = REGIONS.steps
+        most = REGIONS.all * self.counts[self.parents < 0].sum()
+        levels, above = [self._leaves_of(way[0])], self._above([way[0]], np.zeros(len(self.parents), bool))
+        sizes, lives = self.counts[way], self._lives(way)
+        while True:
+            size = self.counts[: len(self.atoms)][levels[-1]].sum()
+            near = np.flatnonzero((sizes >= low * size) & (sizes <= min(high * size, most)))
+            more = None
+            if not len(near):
+                more = self._onward(levels[-1], above, low * size, min(high * size, most))
+            if not len(near) and more is None:
+                near = np.flatnonzero((sizes > size) & (sizes <= min(REGIONS.leap * size, most)))[:1]
+            if len(near):
+                around = way[int(near[lives[near].argmax()])]
+                more = levels[-1] | self._leaves_of(around)
+                above = self._above([around], above)
+            if more is None:
+                return levels
+            levels.append(more)
+
+    def _lives(self, way: list[int]) -> Float[np.ndarray, " w"]:
+        """How long the borders of the regions of a way hold, as ratios; what nothing holds holds longest."""
+        heights = np.maximum(self.heights[way], 1e-9)
+        return np.append(heights[1:], np.inf) / heights
+
+    def _onward(
+        self, inside: Bool[np.ndarray, " k"], above: Bool[np.ndarray, " t"], least: float, most: float
+    ) -> Bool[np.ndarray, " k"] | None:
+        """Leaves with what is beside them that they touch most, until they are so many Gaussians; None where
+        that is too large. above: the regions that they are part of; those of the new ones are added."""
+        inside, small, came = inside.copy(), self.counts[: len(self.atoms)], np.flatnonzero(inside)
+        areas, (touch, shared) = self.sizes[: len(small)], np.zeros((2, len(small)))
+        while (size := small[inside].sum()) < least:
+            touch += self.contacts[came].sum(0)
+            room = (most - size) / 2  # the rest is for what other photos show of it
+            beside = np.where(inside | (small > room), 0, touch)
+            if not beside.any():
+                return None
+            new = int(beside.argmax())
+            while (up := self.parents[new]) >= 0 and not above[up] and self.counts[up] <= room:
+                new = int(up)
+            own = np.flatnonzero(self._leaves_of(new))
+            shared += self.overlaps[np.append(came, own)].sum(0)
+            inside[own] = True
+            twins = np.flatnonzero((shared >= REGIONS.twin * areas) & ~inside)
+            twins = twins[np.argsort(-shared[twins] / areas[twins], kind="stable")]
+            twins = twins[small[twins].cumsum() <= most - size - self.counts[new]]
+            shared += self.overlaps[twins].sum(0)
+            inside[twins] = True
+            self._above([new, *twins.tolist()], above)
+            came = np.append(own, twins)
+        return inside
+
+    def _above(self, regions: list[int], held: Bool[np.ndarray, " t"]) -> Bool[np.ndarray, " t"]:
+        """What regions are part of, into what is held."""
+        for region in regions:
+            while (region := self.parents[region]) >= 0 and not held[region]:
+                held[region] = True
+        return held
+
+
+def regions_of(scene: Scene) -> Regions:
+    """The tree of a scene. Linear in Gaussians and pixels of all grids."""
+    *_, tree = regions_in_steps(scene)
+    assert isinstance(tree, Regions)
+    return tree
 
 
 @torch.no_grad()
-def regions_of(scene: Scene) -> Regions:
-    """The tree of a scene. Linear in Gaussians and pixels of all grids."""
-    nodes = _Nodes.of(scene)
+def regions_in_steps(scene: Scene) -> Iterator[float | Regions]:
+    """The same at the end; before, shares of the work that are done."""
+    nodes = yield from _Nodes.of(scene)
     if not len(nodes.atoms):
-        return Regions(nodes.own, np.zeros(0, int), np.zeros(0), np.zeros(0), np.zeros(0, int))
+        none, zero, alone = np.zeros(0, int), np.zeros(0), csr_array((0, 0))
+        yield Regions(nodes.own, none, zero, zero, none, alone, alone)
+        return
     first, second = nodes.pairs
     near = np.linalg.norm(nodes.colours[first] - nodes.colours[second], axis=1) < REGIONS.shade
     same = near & (nodes.atoms[first] == nodes.atoms[second]) & (nodes.jumps < 0.5) & nodes.beside
     leaves = _label_components(first[same], second[same], len(nodes.atoms))
-    tree = _Joining.of(nodes, leaves, _meaning(scene)).done()
+    joining = _Joining.of(nodes, leaves, _meaning(scene))
+    (first, second), shape = joining.ends, (len(joining.sizes), len(joining.sizes))
+    both, pixels = (np.append(first, second), np.append(second, first)), math.prod(scene.view_size)
+    lengths = joining.borders - joining.jumps + joining.overlaps, joining.overlaps
+    meet = [csr_array((np.tile(each / pixels, 2).astype(np.float32), both), shape) for each in lengths]
+    tree = yield from joining.done()
     atoms = np.full(int(leaves.max()) + 1, -1)
     atoms[leaves] = nodes.atoms
-    return Regions(np.append(leaves, -1)[nodes.own], *tree, atoms)
+    yield Regions(np.append(leaves, -1)[nodes.own], *tree, atoms, *meet)
 
 
 def _label_components(first: np.ndarray, second: np.ndarray, count: int) -> Integer[np.ndarray, " n"]:
@@ -179,15 +290,15 @@ class _Nodes:
     beside: Bool[np.ndarray, " m"]
 
     @staticmethod
-    def of(scene: Scene) -> "_Nodes":
-        """Of a scene."""
+    def of(scene: Scene) -> Generator[float, None, "_Nodes"]:
+        """Of a scene; half of the work."""
         means = scene.gaussians.means.detach().cpu()
         finite = torch.isfinite(means).all(1).numpy() & (covered_areas(scene.gaussians) > 0)
         views = np.full(len(means), -1) if scene.view_ids is None else scene.view_ids.cpu().numpy()
-        shown = [
-            _Grid.of(scene, view, finite & (views == view)) for view in np.unique(views[views >= 0]).tolist()
-        ]
-        grids = [grid for grid in shown if len(grid.rows)]
+        grids, seen = list[_Grid](), np.unique(views[views >= 0]).tolist()
+        for number, view in enumerate(seen):
+            yield 0.25 * number / len(seen)
+            grids += [grid for grid in [_Grid.of(scene, view, finite & (views == view))] if len(grid.rows)]
         free = np.flatnonzero(finite & (views < 0))
         pixels = scene.view_size[0] * scene.view_size[1]
         start = len(grids) * pixels
@@ -198,7 +309,10 @@ class _Nodes:
         atoms, colours = strongest_atoms(scene.semantics), _lab(scene)
         front = np.concatenate([*(grid.front.ravel() for grid in grids), free]).astype(np.int64)
         areas = covered_areas(scene.gaussians)[free]
-        links = [*_within(grids, pixels), *_across(scene, grids, pixels), _free(scene, free, start)]
+        links = [*_within(grids, pixels), _free(scene, free, start)]
+        for number, link in enumerate(_across(scene, grids, pixels)):
+            yield 0.25 + 0.25 * number / max(len(grids) * REGIONS.partners, 1)
+            links.append(link)
         first, second, jumps, beside = (np.concatenate(each) for each in zip(*links, strict=True))
         return _Nodes(
             np.where(front >= 0, np.append(atoms, -1)[front], -1),
@@ -426,9 +540,11 @@ class _Joining:
         total *= np.minimum(shares[first], shares[second]) ** REGIONS.size
         return np.where(side | (overlap >= REGIONS.least_overlap), total, np.inf)
 
-    def done(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Parents, heights and sizes of the tree."""
+    def done(self) -> Generator[float, None, tuple[np.ndarray, np.ndarray, np.ndarray]]:
+        """Parents, heights and sizes of the tree; the other half of the work."""
+        most = len(self.sizes)
         while len(self.borders):
+            yield 1 - 0.5 * len(self.sizes) / most
             differences = self.differences()
             pairs = _mutual(self.ends, differences, len(self.sizes))
             if not len(pairs):

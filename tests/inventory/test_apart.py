@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import torch
+from scipy.sparse import csr_array
 
 from langflash_core.inventory import inventory
 from langflash_core.inventory.apart import DEEPEST, taken_apart
@@ -14,8 +15,8 @@ from tests.inventory.test_things import with_more
 
 def tree(parents: list[int], leaves: int) -> Regions:
     count = len(parents)
-    none = np.zeros(count)
-    return Regions(np.arange(leaves), np.array(parents), none, none, np.zeros(leaves, int))
+    none, alone = np.zeros(count), csr_array((leaves, leaves))
+    return Regions(np.arange(leaves), np.array(parents), none, none, np.zeros(leaves, int), alone, alone)
 
 
 def test_the_largest_regions_that_fit_are_things_and_specks_are_not():

@@ -12,6 +12,7 @@ from langflash_core.geometry.rotations import turn_of
 from langflash_core.inventory import inventory
 from langflash_core.inventory.things import upright_box
 from langflash_core.scene.joining import append_part
+from langflash_core.writing.inventory.words import doubt_of
 from tests.boxroom import (
     CHAIRS,
     EYE,
@@ -156,6 +157,25 @@ def test_a_line_is_no_thing(room):
         more = with_more(room, np.array((1.6, 1.2, 2.0)) + rng.uniform(size=(600, 3)) * extent, "chair")
         chairs.append(inventory(more, threshold=0.0, least=0.0).counts["chair"])
     assert chairs == [2, 3]
+
+
+@pytest.mark.parametrize(
+    ("extent", "count", "thin"),
+    [
+        ((0.13, 0.25, 0.04), 0, False),  # "a plant 13 cm wide" and 4 cm deep
+        ((0.6, 0.6, 0.04), 1, True),
+        ((0.6, 0.6, 0.3), 1, False),
+    ],
+)
+def test_one_side_of_a_body_is_no_small_thing_and_in_doubt_as_a_large_one(room, extent, count, thin):
+    rng = np.random.default_rng(0)
+    more = with_more(room, np.array((1.6, 1.0, 2.0)) + rng.uniform(size=(600, 3)) * extent, "chair")
+    chairs = [each for each in inventory(more, threshold=0.0, least=0.0).things if each.kind == "chair"]
+    (new,) = [each for each in chairs if each.bottom > 0.5] if count else [None]
+    assert len(chairs) == 2 + count
+    if new is not None:
+        assert new.thin == thin and bool(doubt_of(replace(new, sure=1.0))) == thin
+    assert not any(each.thin for each in chairs if each is not new)
 
 
 def test_a_thing_has_a_size_and_a_place_in_the_room():

@@ -147,9 +147,10 @@ def two_ladders(orange: float, elsewhere: float) -> Sight:
     ("orange", "elsewhere", "sizes"),
     [
         (0.25, 0.05, [200]),  # it stands out, whole
-        (0.25, 0.15, [50, 150, 20]),  # none does: what is orange of each
+        (0.25, 0.15, [50, 150]),  # none does: what is orange of each
         (0.6, 0.05, [200, 20]),  # mostly orange, with the crumb that is, too
-        (0.1, 0.0, [20, 20]),
+        (0.1, 0.0, [20]),
+        (0.04, 0.03, []),  # an orange label makes no orange ladder
     ],
 )
 def test_the_one_that_stands_out_is_meant(orange: float, elsewhere: float, sizes: list[int]) -> None:

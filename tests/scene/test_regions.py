@@ -12,6 +12,7 @@ from langflash_core.geometry.cameras import intrinsics_from_fov, invert_rigid, r
 from langflash_core.geometry.harmonics import colour_to_sh
 from langflash_core.scene.instances import things
 from langflash_core.scene.regions import _mutual, regions_of
+from langflash_core.scene.settings import REGIONS
 from langflash_core.types import Gaussians, Record, Scene, Semantics
 
 HEIGHT, WIDTH, FOV = 60, 80, 60.0
@@ -117,6 +118,34 @@ def test_levels_grow_and_hold_what_was_clicked():
     )
     assert any(overlap(each, np.isin(own, (LEFT, SIGN))) > 0.95 for each in rows), "the sign with its box"
     assert (reach.rows(-3) == rows[0]).all() and (reach.rows(99) == rows[-1]).all()
+
+
+def tiled() -> tuple[Scene, np.ndarray]:
+    """One photo of a wall of tiles, 5 pixels wide, with a lamp on it; and whether each Gaussian is the
+    lamp's."""
+    scene, _ = photographed((0.0,))
+    v, u = np.divmod(np.arange(WIDTH * HEIGHT), WIDTH)
+    lamp = (abs(v - 30) < 3) & (abs(u - 40) < 3)
+    tiles = (v // 5 + u // 5) % 2
+    colours = torch.tensor([[0.6, 0.6, 0.6], [0.72, 0.72, 0.72]])[tiles]
+    colours[torch.from_numpy(lamp)] = torch.tensor([0.9, 0.8, 0.1])
+    points = rays(scene.Ks[0], WIDTH, HEIGHT).reshape(-1, 3) * DEPTHS[WALL]
+    gaussians = replace(scene.gaussians, means=points, sh=colour_to_sh(colours)[:, None])
+    semantics = replace(scene.semantics, weight_ids=torch.from_numpy(lamp.astype(np.int64))[:, None])
+    return replace(scene, gaussians=gaussians, semantics=semantics), lamp
+
+
+def test_more_of_a_thing_comes_in_steps_that_people_follow():
+    """From a lamp a step led to the whole wall, 190 times as large."""
+    scene, lamp = tiled()
+    reach = regions_of(scene).around(lamp & (np.arange(len(lamp)) % 3 == 0))
+    assert reach is not None and overlap(reach.rows(reach.chosen), lamp) > 0.9
+    counts = [int(reach.rows(level).sum()) for level in range(reach.chosen, reach.count)]
+    low, high = REGIONS.steps
+    assert len(counts) > 3 and counts[-1] > 0.25 * len(lamp)
+    assert all(low <= more / less <= high for less, more in itertools.pairwise(counts)), counts
+    first = np.flatnonzero(reach.rows(reach.chosen + 1))
+    assert np.abs(first // WIDTH - 30).max() < 15 and np.abs(first % WIDTH - 40).max() < 15, "what touches it"
 
 
 def test_parents_are_later_and_no_lower():

@@ -120,7 +120,8 @@ def _lines(found: "Inventory") -> list[str]:
     lines = [
         "  ".join(f"{cell:{width}}" for cell, width in zip(row, widths, strict=True)).rstrip() for row in rows
     ]
-    doubted = ["?: it may be something else."] * any(doubt_of(thing) for thing in found.things)
+    whys = dict.fromkeys(doubt for thing in found.things if (doubt := doubt_of(thing)))
+    doubted = [f"?: {' or '.join(whys)}."] * bool(whys)
     return [*lines, *doubted, scale_note(found.guess, found.unit)]
 
 

@@ -52,6 +52,11 @@ class Prompt:
     reading: str = ""
 
     @property
+    def otherwise(self) -> bool:
+        """Whether what it names is here, and none of it is as it says: a wall that is not red."""
+        return bool(self.reading) and self.score == 0
+
+    @property
     def found(self) -> bool | None:
         """Whether the view on show holds it; None until it is answered."""
         return None if self.score is None else self.score >= self.cut

@@ -12,7 +12,7 @@ from langflash_core.scene.mask import Mask
 from ..asking.commands import revise
 from ..commands import Notify
 from ..state import State
-from .state import Floaters, Point, Region
+from .state import THINGS, Floaters, Point, Region
 
 FELL_OFF = "The oldest edits can no longer be undone: the list keeps the last 1,000, or 32 MB of them."
 
@@ -50,7 +50,7 @@ class SelectThing:
     combine: Combine = "replace"
 
     def apply(self, state: State) -> State:
-        return state.with_editing(drag=(), waiting="" if state.scene.info is None else "Finding things")
+        return state.with_editing(drag=(), waiting="" if state.scene.info is None else THINGS)
 
 
 @dataclass(frozen=True)

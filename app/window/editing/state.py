@@ -226,6 +226,10 @@ def _up_to(least: bytes, most: float) -> Mask:
     return Mask.of(np.frombuffer(least, np.float32) <= most)
 
 
+THINGS = "Finding things"
+"""What a click waits for that takes a thing: the first one in a scene, some seconds."""
+
+
 @dataclass(frozen=True)
 class Editing:
     """The editing half of the state.
@@ -233,6 +237,7 @@ class Editing:
     saved: the marks that the file on disk holds; None when it holds none of these.
     radius: of the brush, design pixels. reach: of growing, in spacings of the Gaussians.
     drag: the region being drawn, framebuffer pixels. waiting: what the worker is looking for.
+    searched: how much of the scene it went through for things, of 1.
     hover: what is under the pointer. asked: where a click waits for the picture to rest.
     names: nearest words of each atom, best first; found: the best of them that are found when asked.
     ruler: the ends of what is measured, world.
@@ -252,6 +257,7 @@ class Editing:
     reach: float = 3.0
     drag: tuple[Point, ...] = ()
     waiting: str = ""
+    searched: float = 1.0
     hover: Reading | None = None
     asked: Point | None = None
     card: Card | None = None

@@ -12,6 +12,16 @@ from .state import Outline, Reached
 
 
 @dataclass(frozen=True)
+class Searched:
+    """How much of the scene was searched for things, of 1."""
+
+    share: float
+
+    def apply(self, state: State) -> State:
+        return state.with_editing(searched=self.share)
+
+
+@dataclass(frozen=True)
 class ThingFound:
     """What a click can mean, the smallest first, and which of it is one thing."""
 

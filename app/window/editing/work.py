@@ -3,7 +3,7 @@
 Heavy imports wait until they are needed. No OpenGL, no ImGui.
 """
 
-from collections.abc import Iterable, Iterator
+from collections.abc import Generator, Iterable, Iterator
 from dataclasses import dataclass, field, replace
 from functools import lru_cache
 from pathlib import Path
@@ -37,7 +37,7 @@ from .mending import MarginsFound
 from .pointing import AtomsNamed, Named, ReadingTaken
 from .state import BY_STRENGTH, PICK_RADIUS, Outline, Point, Reading, Region, strongest
 from .teaching import WordsFound, with_kept
-from .things import Outlined, ThingFound
+from .things import Outlined, Searched, ThingFound
 
 if TYPE_CHECKING:
     from torch import Tensor
@@ -138,7 +138,7 @@ class FindThing(AtPixel):
 
     def run(self, stopping: Asked) -> Iterator[Command]:
         seen, visible = self.seen(), self.marks.visible
-        reach = regions_in(self.memory).around(seen)
+        reach = (yield from regions_in(self.memory)).around(seen)
         if reach is None:
             yield Found(Mask.of(seen), self.combine, "of a thing")
             return
@@ -153,15 +153,21 @@ class PrepareThings(EditTask):
     newest_counts = True
 
     def run(self, stopping: Asked) -> Iterator[Command]:
-        regions_in(self.memory)
-        return iter(())
+        yield from regions_in(self.memory)
 
 
-def regions_in(memory: SceneMemory) -> "Regions":
-    """The tree of a scene, as it came; slow when asked for the first time."""
-    from langflash_core.scene.regions import regions_of
+def regions_in(memory: SceneMemory) -> Generator[Command, None, "Regions"]:
+    """The tree of a scene, as it came; slow when asked for the first time, with news of how far it is."""
+    from langflash_core.scene.regions import regions_in_steps
 
-    return memory.answered("regions", (), lambda: regions_of(memory.scene))
+    if memory.answer_to("regions") is None:
+        for step in regions_in_steps(memory.scene):
+            if isinstance(step, float):
+                yield Searched(step)
+            else:
+                memory.answered("regions", (), lambda tree=step: tree)
+        yield Searched(1.0)
+    return memory.answer_to("regions")
 
 
 @dataclass(frozen=True)

@@ -143,6 +143,7 @@ def _save(state: State, look: Look) -> list[do.Command]:
     imgui.begin_disabled(path is None)
     pressed = widgets.default_button("Replace" if exists else "Save", look.vec(120, 0), confirmed)
     imgui.end_disabled()
+    issued += _cancel(look)
     if path is not None and pressed:
         issued.append(show.SaveScene(path))
     return issued
@@ -171,9 +172,16 @@ def _file(
     imgui.begin_disabled(not text)
     pressed = widgets.default_button(verb, look.vec(120, 0), confirmed)
     imgui.end_disabled()
+    issued += _cancel(look)
     if text and pressed:
         issued.append(make(typed_path(text)))
     return issued
+
+
+def _cancel(look: Look) -> list[do.Command]:
+    """Beside the button that does it."""
+    imgui.same_line()
+    return [do.ShowDialog(None)] if imgui.button("Cancel", look.vec(110, 0)) else []
 
 
 def _path_field(state: State, label: str, place: bool = False) -> tuple[list[do.Command], bool]:

@@ -63,8 +63,6 @@ def figures(state: State) -> list[str]:
             x, y, z = hover.point
             said.append(f"x {x:.3f}  y {y:.3f}  z {z:.3f}  depth {hover.depth:.3f}")
     said.append(stats.renderer)
-    if stats.passes:
-        said.append("passes: " + ", ".join(f"{kind} {count}" for kind, count in stats.passes))
     return said
 
 

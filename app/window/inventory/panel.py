@@ -130,7 +130,8 @@ def _row(state: State, row: Row, look: Look, picture: tuple[float, float, float]
         lit = has_keys and imgui.get_io().nav_visible
         pressed |= imgui.selectable(f"{text}##go", lit, 0, ImVec2(room, 0))[0]
         imgui.pop_item_flag()
-    widgets.tooltip("\n".join((*lines, "Select it and fly there; Shift adds to the selection, Ctrl removes")))
+    told = (*lines, "Photos show one side of it, so its depth is not known.") if row.thin else lines
+    widgets.tooltip("\n".join((*told, "Select it and fly there; Shift adds to the selection, Ctrl removes")))
     imgui.end_group()
     if pressed:
         io = imgui.get_io()
@@ -164,7 +165,7 @@ def _name(state: State, row: Row, width: float) -> list[do.Command]:
     marks = state.editing.marks
     own = marks.thing_names.get(row.id, "") if marks is not None else ""
     imgui.set_next_item_width(width)
-    maybe = "" if row.sure >= SURE else "?"
+    maybe = "?" if row.sure < SURE or row.thin else ""
     entered, name = imgui.input_text_with_hint(
         _NAME, row.id + maybe, own, imgui.InputTextFlags_.enter_returns_true
     )

@@ -27,6 +27,7 @@ class Row:
     cut: bool
     rows: Mask = field(repr=False)
     corners: Float[np.ndarray, "8 3"] = field(repr=False, compare=False)
+    thin: bool = False
 
 
 @dataclass(frozen=True)

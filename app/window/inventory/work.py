@@ -66,7 +66,7 @@ def _row(found: "Inventory", number: int, there: np.ndarray) -> Row:
     rows[there] = found.numbers == number
     return Row(
         thing.id, thing.kind, thing.sure, thing.place, thing.size, thing.bottom, thing.photos, thing.cut,
-        Mask.of(rows), corners_of(found, thing),
+        Mask.of(rows), corners_of(found, thing), thing.thin,
     )  # fmt: skip
 
 

@@ -78,15 +78,22 @@ class PlaceFound:
 
 @dataclass(frozen=True)
 class FolderRead:
-    """What lies in the folder; it is where to begin the next time."""
+    """What lies in the folder."""
 
     folder: Folder
 
     def apply(self, state: State) -> State:
-        if not self.folder.problem and state.dialog is not Dialog.PLACE:
-            wanted = replace(state.preferences, folder=str(self.folder.path))
-            state = replace(state, preferences=wanted)
         return state.with_opening(folder=self.folder)
+
+
+@dataclass(frozen=True)
+class FolderUsed:
+    """Something was opened from this folder or saved there: it is where to begin the next time."""
+
+    folder: Path
+
+    def apply(self, state: State) -> State:
+        return replace(state, preferences=replace(state.preferences, folder=str(self.folder)))
 
 
 @dataclass(frozen=True)
@@ -110,7 +117,7 @@ class Choose:
         several = state.dialog is not Dialog.MERGE  # one scene is merged at a time
         others = tuple(path for path in state.opening.chosen if path != self.path and several)
         chosen = others if self.path in state.opening.chosen else (*others, self.path)
-        return state.with_opening(chosen=chosen)
+        return replace(state.with_opening(chosen=chosen), typed=NOT_TYPED)  # what was done last counts
 
 
 @dataclass(frozen=True)

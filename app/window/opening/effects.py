@@ -1,5 +1,6 @@
 """What opening asks of the world: the desktop's dialog, folders, the clipboard."""
 
+import os
 from collections.abc import Callable
 from pathlib import Path
 
@@ -8,13 +9,22 @@ from ..dialogs import Dialog
 from ..effects import Effects, Hands
 from ..kit.textures import Thumbnails
 from ..scene import samples
-from ..scene.commands import AddPhotos, Instead, OpenPaths, Reconstruct, SetPhotosAside
-from ..scene.drops import typed_path
+from ..scene.commands import (
+    AddPhotos,
+    Instead,
+    OpenPaths,
+    OpenScene,
+    Reconstruct,
+    SceneSaved,
+    SetPhotosAside,
+)
+from ..scene.drops import typed_folder, typed_path
 from ..scene.merging import MergeScene
 from ..state import State
 from . import native
 from .commands import (
     FolderRead,
+    FolderUsed,
     LookForPlace,
     LookInto,
     MorePictures,
@@ -88,14 +98,16 @@ class OpeningEffects(Effects):
                 self._forget(before)
                 self._hands.submit(ReadFolder(folder or _start(state)))
             case FolderRead(folder):
+                self._forget(before)
                 self._hands.submit(SmallPictures(folder.path, folder.photos))
             case MorePictures(folder, paths) if _shows(state, folder):
                 self._hands.submit(SmallPictures(folder, paths))
             case Paste():
                 self._paste()
-            case EditDialogPath(text) if state.dialog is Dialog.OPEN:
-                if len(text) > len(before.typed.text) + 1:  # more than a key brings
+            case EditDialogPath(text) if _looks(state):
+                if state.dialog is Dialog.OPEN and len(text) > len(before.typed.text) + 1:  # more than a key
                     self._paste_into_field(text)
+                self._list_typed(text, state)
             case OpenFilm(path):
                 self._hands.submit(LookThrough(path))
             case TakeFrames() if before.opening.film is not None:
@@ -104,6 +116,20 @@ class OpeningEffects(Effects):
                 if _looks(before) and not _looks(state):
                     self._forget(before)
         self._show_film(before, state)
+        self._note_folder(command, state)
+
+    def _list_typed(self, text: str, state: State) -> None:
+        """What lies where the path leads that is being typed."""
+        folder, shown = typed_folder(text), state.opening.folder
+        if folder is not None and (shown is None or shown.path != folder):
+            self._hands.submit(ReadFolder(folder))
+
+    def _note_folder(self, command: Command, state: State) -> None:
+        """Where a file was opened or saved, if that folder is a person's."""
+        folder = _used(command)
+        known = folder is None or str(folder) == state.preferences.folder
+        if folder is not None and not known and os.path.isdir(folder) and not samples.is_ours(folder):
+            self._hands.perform(FolderUsed(folder))
 
     def _take(self, state: State) -> None:
         """Frames into the tray, and a scene of them."""
@@ -145,6 +171,18 @@ class OpeningEffects(Effects):
             self._thumbnails.drop(small(path))
 
 
+def _used(command: Command) -> Path | None:
+    """The folder of the file that was opened or saved."""
+    match command:
+        case OpenPaths((first, *_)):
+            path = Path(first).absolute()
+            return path if os.path.isdir(path) else path.parent
+        case OpenScene(path) | SceneSaved(path) | MergeScene(path):
+            return path.absolute().parent
+        case _:
+            return None
+
+
 def _shows(state: State, folder: Path) -> bool:
     """Whether small pictures of what lies in a folder are on show."""
     looked, film = state.opening.folder, state.opening.film
@@ -159,7 +197,7 @@ def _looks(state: State) -> bool:
 
 
 def _start(state: State) -> Path:
-    """Where to begin: the last folder, beside the photos at hand, or at home."""
+    """Where to begin: where something was last opened or saved, beside the photos at hand, or at home."""
     last = Path(state.preferences.folder)
     if state.preferences.folder and last.is_dir():
         return last

@@ -36,7 +36,7 @@ class Preferences:
     start_at_once: dropped photos are reconstructed without asking. detail: of DETAILS, how fine scenes of
     photos are. panel_width: design pixels. window: x, y, width, height in screen pixels, or none.
     dictionary: the same of the dictionary's window inside it, design pixels, and whether it is open.
-    recent: newest first. folder: where files were last looked for."""
+    recent: newest first. folder: where one was last opened or saved."""
 
     theme: str = "dark"
     colormap: str = COLOUR_MAPS[0]

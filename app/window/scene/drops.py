@@ -63,9 +63,10 @@ def still_there(
     return tuple(found), tuple(missing)
 
 
-def typed_path(text: str) -> Path:
-    """The path a person typed, with `~` spelled out; an unknown user's stays as it is."""
-    return Path(os.path.expanduser(text.strip()))
+def typed_path(text: str, folder: Path | None = None) -> Path:
+    """The path a person typed, with `~` spelled out; an unknown user's stays as it is. A name alone is of the
+    `folder` on show."""
+    return (folder or Path()) / os.path.expanduser(text.strip())
 
 
 def typed_scene(typed: Typed) -> Path | None:
@@ -74,12 +75,23 @@ def typed_scene(typed: Typed) -> Path | None:
     return _with_ending(typed.text) if named and typed.there is not There.FOLDER else None
 
 
-def look_up(text: str, scene: bool) -> There:
-    """Ask the disk about a path that is typed, or about the file of a `scene` that is called so."""
-    if os.path.isdir(typed_path(text)):
+def look_up(text: str, scene: bool, folder: Path | None = None) -> There:
+    """Ask the disk about a path that is typed while a `folder` is on show, or about the file of a `scene`
+    that is called so."""
+    path = typed_path(text, folder)
+    if os.path.isdir(path):
         return There.FOLDER
-    wanted = _with_ending(text) if scene and typed_path(text).name else typed_path(text)
+    wanted = _with_ending(text) if scene and path.name else path
     return There.FILE if os.path.isfile(wanted) else There.NOTHING
+
+
+def typed_folder(text: str) -> Path | None:
+    """The folder that a path leads to, or that its last name would be in; None while it leads to none, and of
+    a name alone."""
+    path = typed_path(text)
+    if not path.is_absolute():
+        return None
+    return next((folder for folder in (path, path.parent) if os.path.isdir(folder)), None)
 
 
 def _with_ending(text: str) -> Path:

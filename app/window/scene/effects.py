@@ -199,7 +199,7 @@ class SceneEffects(Effects):
         if drop.films:
             perform(OpenFilm(drop.films[0]))
         if len(drop.films) > 1:
-            perform(Notify(f"Only {drop.films[0].name} was opened; drop one film at a time."))
+            perform(Notify(f"Only {drop.films[0].name} was opened; open one film at a time."))
         if drop.scenes and (drop.photos or drop.films):
             came = "photos" if drop.photos else "a film"
             perform(

@@ -47,6 +47,10 @@ class SceneMemory:
         self._answers[question] = (about, answer)
         return answer
 
+    def answer_to(self, question: str) -> Any:
+        """The last answer; None where nobody asked."""
+        return self._answers.get(question, (None, None))[1]
+
     def surroundings(self) -> "Surroundings | None":
         """What is around a camera in the scene as it came; slow when asked for the first time."""
         from langflash_core.scene.surroundings import surroundings_of

@@ -37,9 +37,13 @@ def beside(photos: Sequence[Photo]) -> Path:
     if not photos:
         return Path.home() / f"scene{SCENE_SUFFIX}"
     folder = photos[0].path.parent
-    ours = any(folder.is_relative_to(own) for own in (asset_path("photos"), home_folder(), state_folder()))
-    name = _words_of([photo.path for photo in photos]) or ("" if ours else folder.name) or "scene"
-    return (Path.home() if ours else folder) / f"{name}{SCENE_SUFFIX}"
+    name = _words_of([photo.path for photo in photos]) or ("" if is_ours(folder) else folder.name) or "scene"
+    return (Path.home() if is_ours(folder) else folder) / f"{name}{SCENE_SUFFIX}"
+
+
+def is_ours(folder: Path) -> bool:
+    """Whether a folder is the program's own, and no place for a person's files."""
+    return any(folder.is_relative_to(own) for own in (asset_path("photos"), home_folder(), state_folder()))
 
 
 def _words_of(paths: Sequence[Path]) -> str:

@@ -6,12 +6,15 @@ from langflash_core.inventory.things import Thing
 
 SURE = 0.95
 """From here on a thing is what it is called; below it may be."""
+THIN = "photos show one side of it, so its depth is not known"
 
 
 def doubt_of(thing: Thing, plan: Plan | None = None) -> str:
     """Why a thing may not be as it is listed, or ""."""
     if thing.sure < SURE:
         return "it may be something else"
+    if thing.thin:
+        return THIN
     return "it goes through a wall" if plan is not None and thing.id in plan.astray else ""
 
 

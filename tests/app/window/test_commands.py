@@ -93,5 +93,7 @@ def test_a_finer_picture_on_its_way_is_told_in_the_status_bar() -> None:
     assert not any("refining" in text for text in figures(state))
     drawing = replace(state, stats=replace(state.stats, settling=True))
     assert "refining ..." in figures(drawing)
+    counted = replace(state, stats=replace(state.stats, passes=(("blend", 5),)))
+    assert figures(counted) == figures(state), "counts of passes tell nobody anything"
     failed = replace(state, stats=replace(state.stats, failing=True))
     assert any("refining failed" in text for text in figures(failed))

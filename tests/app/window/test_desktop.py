@@ -1,15 +1,18 @@
 """Where the window opens: wholly on a screen, as large as it was."""
 
 import json
+import logging
 import os
 import subprocess
 import sys
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
+import glfw
 import pytest
 
-from app.window.desktop import Rect, fitted
+from app.window.desktop import Rect, fitted, open_window
 from app.window.recovery import preferences
 from tests.app.window.test_window import ROOT, pytestmark, x_server
 from tests.app.window.x11 import Client
@@ -47,6 +50,20 @@ def test_a_window_is_wholly_on_the_screen_that_shows_most_of_it(
 ) -> None:
     assert fitted(wanted, areas, frame) == expected
     assert fitted(expected, areas, frame) == expected, "the next start changes nothing"
+
+
+def test_what_glfw_complains_of_is_not_written_to_the_terminal(monkeypatch, capfd) -> None:
+    """A raw line stood there at the start, of which nobody could make anything."""
+    told: list[Any] = []
+    doing = ("init", "window_hint", "make_context_current", "swap_interval")
+    for name in doing:
+        monkeypatch.setattr(glfw, name, lambda *_: True)
+    monkeypatch.setattr(glfw, "create_window", lambda *_: object())
+    monkeypatch.setattr(glfw, "set_error_callback", told.append)
+    monkeypatch.setattr(logging.getLogger(), "handlers", [])  # as without pytest: the last resort writes
+    open_window((900, 560))
+    told[-1](65544, b"X11: something of no consequence")
+    assert capfd.readouterr().err == ""
 
 
 @pytest.mark.parametrize(

@@ -151,10 +151,11 @@ def _verdict(state: State, prompt: Prompt, look: Look) -> list[do.Command]:
     if widgets.quiet_button(f"{fa.ICON_FA_ROTATE_LEFT}##calibrated", "Back to the calibrated threshold"):
         issued.append(ask.SetThreshold(prompt.key, None))
     imgui.end_disabled()
-    if prompt.found is False and prompt.photo not in (None, state.scene.view):
-        if imgui.small_button(f"Photo {prompt.photo + 1} shows it##where"):
+    if prompt.found is False and prompt.photo not in (None, state.scene.view) and not prompt.otherwise:
+        what = prompt.reading.partition(",")[0]  # of "wall, purple" only a wall is known to be there
+        if imgui.small_button(f"Photo {prompt.photo + 1} shows {what or 'it'}##where"):
             issued.append(camera.JumpTo(prompt.photo))
-        widgets.tooltip("Go to the photo that shows most of it")
+        widgets.tooltip(f"Go to the photo that shows most of {what or 'it'}")
     if prompt.reading:
         issued += _reading(prompt, look)
     if prompt.note:

@@ -35,7 +35,7 @@ def draw(state: State, look: Look) -> list[do.Command]:
         return []
     known = None if state.scene.info is None else reliability(state.scene.info.scene.record.calibration)
     issued = _plot(prompt, np.array(found.counts, float), known, look)
-    if known is not None and prompt.score is not None:
+    if known is not None and prompt.score is not None and not prompt.otherwise:
         share = 100 * known.at(prompt.score)
         score = f"{prompt.score:.2f}"
         widgets.muted(f"On {known.on}, a score of {score} is right {share:.0f} % of the time.")

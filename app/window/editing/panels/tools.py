@@ -15,7 +15,7 @@ from .. import cleaning as clean
 from .. import commands as edit
 from .. import mending, placing, things
 from .. import pointing as point
-from ..state import RADIUS_RANGE, REACH_RANGE, Floaters, Hiding, Reached, Tool
+from ..state import RADIUS_RANGE, REACH_RANGE, THINGS, Editing, Floaters, Hiding, Reached, Tool
 from . import placing as placing_bar
 
 _TOOLS = (
@@ -239,7 +239,7 @@ def _selection(state: State, look: Look, right: float) -> list[do.Command]:
     imgui.text_colored(theme.SELECTED, fa.ICON_FA_DRAW_POLYGON)
     imgui.same_line()
     begin = imgui.get_cursor_pos_x()
-    imgui.text(f"{editing.waiting} ..." if editing.waiting else f"{editing.num_selected:,} selected")
+    imgui.text(waits(editing) or f"{editing.num_selected:,} selected")
     if not editing.num_selected:
         return issued
     count = 0 if state.scene.info is None else state.scene.info.num_gaussians
@@ -252,6 +252,13 @@ def _selection(state: State, look: Look, right: float) -> list[do.Command]:
         issued += _levels(editing.reached, look, right)
     imgui.pop_style_var()
     return issued
+
+
+def waits(editing: Editing) -> str:
+    """What is being looked for and, where that takes long, how far it is."""
+    if editing.waiting == THINGS and editing.searched < 1:
+        return f"{THINGS}, once per scene: {editing.searched:.0%}"
+    return f"{editing.waiting} ..." if editing.waiting else ""
 
 
 def _levels(reached: Reached, look: Look, right: float) -> list[do.Command]:

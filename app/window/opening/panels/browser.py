@@ -39,7 +39,8 @@ def draw(state: State, look: Look) -> list[do.Command]:
     height = min(look.px(_HEIGHT), widgets.above_buttons(look.px(24), look.px(60)))
     imgui.begin_child("##files", ImVec2(0, height), shape)
     if folder is not None:
-        if _walked(folder) and imgui.get_io().nav_visible:  # what had the keys went with the folder before
+        keys = imgui.get_io().nav_visible and not state.typed.text
+        if _walked(folder) and keys:  # what had the keys went with the folder before
             imgui.set_keyboard_focus_here()
         issued += _inside(state, folder, look)
     imgui.end_child()
@@ -75,13 +76,20 @@ def _way(folder: Folder, look: Look) -> list[do.Command]:
 
 
 def _inside(state: State, folder: Folder, look: Look) -> list[do.Command]:
-    """Folders, scenes, then photos as a grid."""
+    """Folders, scenes, then photos as a grid: those that begin as what is typed."""
     issued: list[do.Command] = []
-    scenes = () if state.dialog is Dialog.PLACE else folder.scenes
-    photos, films = (folder.photos, folder.films) if state.dialog is Dialog.OPEN else ((), ())
+    begun = _begun(state, folder)
+    folders, scenes, films, photos = (
+        tuple(path for path in some if path.name.lower().startswith(begun.lower()))
+        for some in (
+            folder.folders,
+            () if state.dialog is Dialog.PLACE else folder.scenes,
+            *((folder.films, folder.photos) if state.dialog is Dialog.OPEN else ((), ())),
+        )
+    )
     if folder.problem:
         widgets.muted(folder.problem)
-    for path in folder.folders:
+    for path in folders:
         if imgui.selectable(f"{fa.ICON_FA_FOLDER}  {path.name}##{path}", False)[0] and not _again():
             issued.append(opening.LookInto(path))
     for path in (*scenes, *films):
@@ -98,9 +106,17 @@ def _inside(state: State, folder: Folder, look: Look) -> list[do.Command]:
         widgets.muted(f"and {folder.left_out} more; type a path to open one of them")
     if folder.unsaid:
         widgets.muted(f"and {folder.unsaid} with names that are not UTF-8; rename them")
-    if not (folder.folders or photos or films or scenes or folder.problem):
-        widgets.muted("No folders here." if state.dialog is Dialog.PLACE else "Nothing to open here.")
+    if not (folders or photos or films or scenes or folder.problem):
+        nothing = "No folders here." if state.dialog is Dialog.PLACE else "Nothing to open here."
+        widgets.muted(f'Nothing here begins with "{begun}".' if begun else nothing)
     return issued
+
+
+def _begun(state: State, folder: Folder) -> str:
+    """The name in this folder that is being typed; "" where none is, or the whole folder is meant."""
+    path = typed_path(state.typed.text, folder.path)
+    inside = path.parent == folder.path and path != folder.path and state.typed.there is not There.FOLDER
+    return path.name if state.typed.text.strip() and inside else ""
 
 
 def _walked(folder: Folder) -> bool:
@@ -156,9 +172,11 @@ def _again() -> bool:
 
 def _buttons(state: State, confirmed: bool, look: Look) -> list[do.Command]:
     issued: list[do.Command] = []
-    typed, chosen = state.typed.text.strip(), state.opening.chosen
-    count, merging = len(chosen), state.dialog is Dialog.MERGE
-    label = "Merge" if merging else "Open" if typed or count < 2 else f"Open {count} files"
+    typed, chosen, folder = state.typed.text.strip(), state.opening.chosen, state.opening.folder
+    path = typed_path(typed, None if folder is None else folder.path)
+    walks = bool(typed) and _walks(state, path)
+    merging = state.dialog is Dialog.MERGE
+    label = "Look inside" if walks else "Merge" if merging else _opens(state, path)
     imgui.begin_disabled(not typed and not chosen)
     pressed = widgets.default_button(f"{label}###open", look.vec(140, 0), confirmed)
     imgui.end_disabled()
@@ -170,13 +188,31 @@ def _buttons(state: State, confirmed: bool, look: Look) -> list[do.Command]:
     imgui.align_text_to_frame_padding()
     imgui.text_colored(theme.MUTED, told)
     if typed and pressed:
-        path = typed_path(typed)
-        walks = confirmed and state.typed.there is There.FOLDER and typed.endswith(os.sep)
         merge_or_open = MergeScene(path) if merging else show.OpenPaths((str(path),))
         issued.append(opening.LookInto(path) if walks else merge_or_open)
     elif chosen and pressed:
         issued.append(_opened(state, chosen))
     return issued
+
+
+def _walks(state: State, path: Path) -> bool:
+    """Whether the folder that is typed is to be looked into: it has no photos of a room, a separator ends it,
+    or it is not on show yet."""
+    if state.typed.there is not There.FOLDER:
+        return False
+    shown = state.opening.folder
+    photos = shown is not None and shown.path == path and shown.photos and state.dialog is Dialog.OPEN
+    return not photos or state.typed.text.strip().endswith(os.sep)
+
+
+def _opens(state: State, path: Path) -> str:
+    """What the button says that opens the path that is typed, or what is chosen."""
+    shown, count = state.opening.folder, len(state.opening.chosen)
+    if state.typed.text.strip():
+        whole = shown is not None and state.typed.there is There.FOLDER and shown.path == path
+        count = len(shown.photos) if shown is not None and whole else 1
+        return f"Open {count} photos" if count > 1 else "Open"
+    return "Open" if count < 2 else f"Open {count} files"
 
 
 def _place_buttons(state: State, confirmed: bool, look: Look) -> list[do.Command]:
@@ -188,8 +224,9 @@ def _place_buttons(state: State, confirmed: bool, look: Look) -> list[do.Command
     imgui.same_line()
     if imgui.button("Back", look.vec(110, 0)):
         return [opening.PlaceFound(None)]
-    if typed and confirmed:
-        return [opening.LookInto(typed_path(typed))]
+    wanted = typed_path(typed, None if folder is None else folder.path)
+    if typed and confirmed and folder is not None and wanted != folder.path:
+        return [opening.LookInto(wanted)]
     if pressed and folder is not None:
-        return [opening.PlaceFound(typed_path(typed) if typed else folder.path)]
+        return [opening.PlaceFound(wanted if typed else folder.path)]
     return []

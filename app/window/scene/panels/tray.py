@@ -116,7 +116,7 @@ def _tray(state: State, look: Look) -> list[do.Command]:
         imgui.push_id(str(photo.path))
         picture = look.thumbnails.get(str(photo.path))
         found = None if picture is None else lenses.found_lens(info, places, photo, picture[1])
-        removed = _card(look, photo, found, size, state.scene.job is None)
+        removed = _card(look, photo, _lens(photo, found), size, state.scene.job is None)
         if state.scene.job is None:
             issued += _drag(index)
             if removed:
@@ -147,15 +147,16 @@ def _drag(index: int) -> list[do.Command]:
     return issued
 
 
-def _card(look: Look, photo: Photo, found: FoundLens | None, size: ImVec2, open_for_change: bool) -> bool:
-    """One thumbnail, cropped to the card; returns whether its cross was pressed."""
+def _card(look: Look, photo: Photo, lens: str, size: ImVec2, open_for_change: bool) -> bool:
+    """One thumbnail, cropped to the card; returns whether its cross was pressed. lens: in words."""
     corner = imgui.get_cursor_screen_pos()
     end = ImVec2(corner.x + size.x, corner.y + size.y)
     canvas = imgui.get_window_draw_list()
     imgui.invisible_button("card", size)
     hovered = imgui.is_item_hovered()
     if imgui.is_item_hovered(imgui.HoveredFlags_.for_tooltip):
-        imgui.set_tooltip(f"{shown_name(photo.path.name)}\nClick to set its lens, drag to reorder")
+        name = shown_name(photo.path.name)
+        imgui.set_tooltip(f"{name}\n{lens}\nClick to set its lens, drag to reorder")
     picture = look.thumbnails.get(str(photo.path))
     canvas.add_rect_filled(corner, end, widgets.u32(theme.RAISED), look.px(6))
     if picture is not None:
@@ -166,18 +167,16 @@ def _card(look: Look, photo: Photo, found: FoundLens | None, size: ImVec2, open_
         extent = imgui.calc_text_size(icon)
         middle = ImVec2((corner.x + end.x - extent.x) / 2, (corner.y + end.y - extent.y) / 2)
         canvas.add_text(middle, widgets.u32(theme.BAD if photo.problem else theme.MUTED), icon)
-    if picture is not None:
-        _badge(look, ImVec2(corner.x + look.px(4), end.y - look.px(4)), f"{_fov(photo, found):.0f}°")
     if photo.notes:
-        place = ImVec2(corner.x + look.px(4), corner.y + look.px(22))
-        _badge(look, place, fa.ICON_FA_TRIANGLE_EXCLAMATION, theme.DARK.ACCENT)
+        _mark(look, ImVec2(corner.x + look.px(4), corner.y + look.px(22)))
     if hovered:
         canvas.add_rect(corner, end, widgets.u32(theme.ACCENT), look.px(6), look.px(1.5))
     return open_for_change and hovered and _cross(look, ImVec2(end.x, corner.y))
 
 
-def _badge(look: Look, lower_left: ImVec2, text: str, colour=theme.DARK.TEXT) -> None:
-    """A few letters on a dark ground over a picture."""
+def _mark(look: Look, lower_left: ImVec2) -> None:
+    """Over a picture of which there is something to say, on a dark ground."""
+    text, colour = fa.ICON_FA_TRIANGLE_EXCLAMATION, widgets.u32(theme.DARK.ACCENT)
     canvas, extent = imgui.get_window_draw_list(), imgui.calc_text_size(text)
     factor = 0.82
     size = ImVec2(extent.x * factor + look.px(8), extent.y * factor + look.px(2))
@@ -185,7 +184,7 @@ def _badge(look: Look, lower_left: ImVec2, text: str, colour=theme.DARK.TEXT) ->
     end = ImVec2(corner.x + size.x, lower_left.y)
     canvas.add_rect_filled(corner, end, imgui.IM_COL32(14, 16, 20, 190), look.px(4))
     at = ImVec2(corner.x + look.px(4), corner.y + look.px(1))
-    canvas.add_text(imgui.get_font(), imgui.get_font_size() * factor, at, widgets.u32(colour), text)
+    canvas.add_text(imgui.get_font(), imgui.get_font_size() * factor, at, colour, text)
 
 
 def _cross(look: Look, upper_right: ImVec2) -> bool:
@@ -207,13 +206,18 @@ def _fov(photo: Photo, found: FoundLens | None) -> float:
     return photo.fov or told
 
 
+def _lens(photo: Photo, found: FoundLens | None) -> str:
+    """How wide a photo is, and who says so."""
+    return f"Field of view {_fov(photo, found):.0f}°, {_source(photo, found)}"
+
+
 def _source(photo: Photo, found: FoundLens | None) -> str:
     """Whence these are."""
     if photo.fov is not None:
         return "your own"
     if found is not None:
         return f"found from the photos, ± {found.error:.1f}"
-    return "from the file" if photo.recorded else "assumed, the file does not say"
+    return "from the file" if photo.recorded else "assumed: the file does not say"
 
 
 def _details(state: State, index: int, photo: Photo, found: FoundLens | None, look: Look) -> list[do.Command]:
@@ -321,7 +325,7 @@ def _buttons(state: State, look: Look) -> list[do.Command]:
 
 
 def _progress(job: Job, now: float, look: Look) -> list[do.Command]:
-    """Cancel and pause, the stage under way and its bar, in the one line of the buttons: nothing moves by a
+    """Cancel, pause and what is left, a bar below, and below that the stage under way: nothing moves by a
     stage. The finished ones with their seconds on hover."""
     issued: list[do.Command] = []
     imgui.begin_disabled(job.cancelling)
@@ -335,16 +339,15 @@ def _progress(job: Job, now: float, look: Look) -> list[do.Command]:
         widgets.tooltip("Pause: progress is kept, even if you quit")
         imgui.same_line()
     imgui.end_disabled()
-    corner, width = imgui.get_cursor_screen_pos(), imgui.get_content_region_avail().x
-    seconds = _seconds(job, now)
-    room = width - imgui.calc_text_size(seconds).x - look.px(8)
     imgui.align_text_to_frame_padding()
-    imgui.text(widgets.shortened(_doing(job), room))
+    with widgets.colours(text=theme.MUTED):
+        imgui.text("")
+        widgets.at_right_edge(_seconds(job, now))
+    corner, width = imgui.get_cursor_screen_pos(), imgui.get_content_region_avail().x
+    _bar(job.fraction, ImVec2(corner.x, corner.y - look.px(4)), width, look)
+    imgui.text(widgets.shortened(_doing(job), width))
     if imgui.is_item_hovered():
         imgui.set_tooltip(_told(job))
-    with widgets.colours(text=theme.MUTED):
-        widgets.at_right_edge(seconds)
-    _bar(job.fraction, ImVec2(corner.x, corner.y + imgui.get_frame_height()), width, look)
     return issued
 
 

@@ -6,12 +6,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
+from imgui_bundle import implot
 
 from app.window.asking import commands as ask
 from app.window.asking import things
-from app.window.asking.panels import prompts
+from app.window.asking.panels import prompts, scores
 from app.window.asking.panels.known import KNOWS
-from app.window.asking.state import EVEN, Insight, Prompt
+from app.window.asking.state import BINS, EVEN, Histogram, Insight, Prompt
 from app.window.asking.work import Encode
 from app.window.editing.pointing import AtomsNamed
 from app.window.editing.work import NameAtoms
@@ -171,8 +172,34 @@ def test_the_photo_that_shows_it_is_one_click_away(monkeypatch) -> None:
         return [row.words for row in rows.now() if row.kind == "small_button"]
 
     assert shown(state.with_scene(view=0)) == ["Photo 2 shows it"]
+    read = Prompt(0, "purple wall", score=0.4, photo=1, reading="wall, purple")
+    assert shown(state.with_asking(prompts=(read,)).with_scene(view=0)) == ["Photo 2 shows wall"], "no colour"
+    here = replace(read, score=0.0)  # a wall, but no purple one
+    assert shown(state.with_asking(prompts=(here,)).with_scene(view=0)) == []
     assert shown(state.with_scene(view=1)) == []
     assert shown(state.with_asking(prompts=(Prompt(0, "door", score=0.9, photo=1),))) == []
+
+
+@pytest.mark.parametrize(
+    ("reading", "score", "told"), [("", 0.9, 1), ("wall, red", 0.9, 1), ("wall, red", 0.0, 0)]
+)
+def test_what_a_score_is_worth_is_not_told_of_what_was_not_scored(
+    monkeypatch, reading: str, score: float, told: int
+) -> None:
+    """ "A score of 0.00 is right 5 % of the time", of a wall that is not red."""
+    rows, state = Rows(monkeypatch), shown_scene()
+    known = {"reliability": {"photos": [{"score": 0.1, "present": 0.0}, {"score": 0.9, "present": 1.0}]}}
+    assert state.scene.info is not None
+    scene = state.scene.info.scene.with_record(calibration=known)
+    state = state.with_scene(info=replace(state.scene.info, scene=scene))
+    prompt = Prompt(0, "red wall", score=score, reading=reading)
+    state = state.with_asking(prompts=(prompt,), histograms=(Histogram(0, "red wall", (1,) * BINS),))
+    with context((500, 500)):
+        implot.create_context()
+        theme.set_up(1.0, "dark")
+        frames(lambda seen: scores.draw(state, seen), look())
+        implot.destroy_context()
+    assert sum("of the time" in row.words for row in rows.now()) == told
 
 
 def test_a_chip_asks_its_word() -> None:

@@ -10,6 +10,7 @@ from app.window.editing import commands as edit
 from app.window.editing import mending, work
 from app.window.editing import pointing as point
 from app.window.editing.effects import EditingEffects
+from app.window.editing.panels.tools import waits
 from app.window.editing.state import Tool
 from app.window.editing.things import Outlined, SetLevel, StepLevel, ThingFound
 from app.window.effects import Hands
@@ -116,9 +117,16 @@ def test_things_are_prepared_once_the_tool_is_taken(clicked: State) -> None:
     assert after(clicked, edit.SelectThing((5.0, 5.0))).editing.waiting == "Finding things"
     effects.follow(taken, clicked, after(clicked, taken))
     (prepares,) = asked
-    assert isinstance(prepares, work.PrepareThings) and list(prepares.run(lambda: False)) == []
-    regions = work.regions_in(prepares.memory)
-    assert work.regions_in(prepares.memory) is regions, "it is kept"
+    assert isinstance(prepares, work.PrepareThings)
+    waiting, told = after(clicked, edit.SelectThing((5.0, 5.0))), []
+    for command in prepares.run(lambda: False):
+        waiting = after(waiting, command)
+        told.append((waiting.editing.searched, waits(waiting.editing)))
+    shares = [share for share, _ in told]
+    assert shares == sorted(shares) and shares[0] < 1 == shares[-1] and len(shares) > 2
+    assert told[0][1] == f"Finding things, once per scene: {shares[0]:.0%}"
+    assert told[-1][1] == "Finding things ..."
+    assert list(work.regions_in(prepares.memory)) == [], "it is kept"
 
 
 def test_what_filling_takes_beyond_the_selection_is_said(desk: Desk) -> None:

@@ -14,11 +14,12 @@ from app.window.opening import commands as opening
 from app.window.opening import effects, native, work
 from app.window.opening.panels.welcome import invitation, working
 from app.window.opening.pasted import pasted_paths
-from app.window.opening.state import MOST_FILES, Folder
+from app.window.opening.state import MOST_FILES
 from app.window.scene import commands as show
 from app.window.scene import merging
 from app.window.scene.drops import sort_drop
 from app.window.state import State
+from langflash_core.base.resources import asset_path
 from langflash_core.errors import LangFlashError
 from tests.app.window.scenes import after, shown_scene
 
@@ -93,7 +94,6 @@ def test_small_pictures_come_a_few_at_a_time_and_go_with_the_dialog(folder: Path
     desk.work()
     assert sum(isinstance(c, ShowPicture) for c in desk.performed) == 7, "the broken one is left out"
     assert sum(isinstance(c, opening.MorePictures) for c in desk.performed) == 2
-    assert desk.state.preferences.folder == str(folder)
     desk.perform(opening.Choose(folder / "b.jpg"))
     desk.perform(opening.Choose(folder / "A.png"))
     desk.perform(opening.Choose(folder / "b.jpg"))
@@ -188,7 +188,7 @@ def test_several_files_are_pasted_into_the_field_for_a_path(tmp_path: Path, monk
     desk = Desk(clipboard="\r\n".join(path.as_uri() for path in paths))
     desk.perform(opening.OpenFiles())
     desk.perform(EditDialogPath("  ".join(path.as_uri() for path in paths)))
-    assert desk.performed[-1] == show.OpenPaths(tuple(map(str, paths))) and desk.state.dialog is None
+    assert show.OpenPaths(tuple(map(str, paths))) in desk.performed and desk.state.dialog is None
     typed = Desk(clipboard=str(paths[0]))
     typed.perform(opening.LookInto(tmp_path))
     typed.perform(EditDialogPath(str(paths[0])))
@@ -252,9 +252,52 @@ def test_photos_stay_on_show_while_they_are_worked_on() -> None:
     assert working(other)
 
 
-def test_a_folder_with_a_problem_is_not_remembered() -> None:
-    state = after(State(), opening.LookInto(), opening.FolderRead(Folder(Path("/gone"), problem="gone")))
-    assert state.preferences.folder == ""
+def test_the_next_look_begins_where_something_was_opened_or_saved(folder: Path, monkeypatch) -> None:
+    """It began at home."""
+    monkeypatch.setattr(native, "is_there", lambda: False)
+    desk = Desk()
+    inside = folder / "inside"
+    for command, expected in (
+        (show.OpenPaths((str(folder / "b.jpg"),)), folder),
+        (show.OpenPaths((str(inside),)), inside),
+        (show.OpenPaths((str(folder / "gone" / "b.jpg"),)), inside),
+        (show.OpenScene(folder / "room.langflash"), folder),
+        (merging.MergeScene(inside / "room.langflash"), inside),
+        (show.SceneSaved(folder / "room.langflash"), folder),
+        (show.OpenPaths((str(asset_path("photos/toy_left.png")),)), folder),
+    ):
+        desk.perform(command)
+        assert desk.state.preferences.folder == str(expected), command
+    desk.perform(opening.LookInto(inside))
+    desk.work()
+    assert desk.state.preferences.folder == str(folder), "a look around is no file opened"
+    desk.perform(opening.OpenFiles())
+    desk.work()
+    assert desk.state.opening.folder is not None and desk.state.opening.folder.path == folder
+
+
+def test_a_path_that_is_typed_is_listed(folder: Path) -> None:
+    """The list below stayed where it was."""
+    desk = Desk()
+    desk.perform(opening.LookInto(folder / "inside"))
+    desk.work()
+    for text, expected in (
+        (str(folder), folder),
+        (f"{folder}{os.sep}", folder),
+        (f"{folder}{os.sep}in", folder),
+        (f"{folder}{os.sep}inside", folder / "inside"),
+        (f"{folder}{os.sep}gone{os.sep}x", folder / "inside"),
+        ("room", folder / "inside"),
+    ):
+        desk.perform(EditDialogPath(text))
+        desk.work()
+        shown = desk.state.opening.folder
+        assert shown is not None and shown.path == expected, text
+        assert desk.state.typed.text == text
+    desk.perform(EditDialogPath(str(folder)))
+    desk.work()
+    desk.perform(opening.Choose(folder / "b.jpg"))
+    assert desk.state.typed.text == "", "what was done last counts"
 
 
 @pytest.mark.parametrize(("count", "title"), [(0, "Drop photos"), (1, "1 photo waits"), (7, "7 photos wait")])

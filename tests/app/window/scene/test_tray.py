@@ -8,29 +8,51 @@ from types import SimpleNamespace
 
 import pytest
 import torch
-from imgui_bundle import imgui
+from imgui_bundle import ImVec2, imgui
 
 from app.window.commands import Command
 from app.window.editing import commands as edit
 from app.window.frame.table import named
 from app.window.kit import theme, widgets
 from app.window.kit.look import Look
+from app.window.recovery.preferences import PANEL_WIDTHS
 from app.window.scene import commands as show
 from app.window.scene.lenses import found_lens, places
 from app.window.scene.panels import tray
-from app.window.scene.state import PAUSED, Photo, SceneInfo
+from app.window.scene.state import _SAID, PAUSED, Job, Photo, SceneInfo, said
 from app.window.scene.work import describe_scene
 from app.window.state import State
 from langflash_core.base.records import FoundLens
 from langflash_core.geometry.cameras import intrinsics_from_fov
 from tests.app.window import headless
 from tests.app.window.items import Items
+from tests.app.window.rows import Rows, clipped
 from tests.app.window.scene.test_rooms import Desk
 from tests.app.window.scenes import after, room, shown_scene, told
 from tests.app.window.test_stumbles import Hands, items, middle
 
 __all__ = ["items"]  # a fixture
 FEW, MANY = tuple(Path(f"/p/{k}.jpg") for k in range(2)), tuple(Path(f"/p/{k}.jpg") for k in range(5))
+
+
+@pytest.mark.parametrize("stage", sorted(_SAID))
+def test_what_is_being_done_is_told_in_whole_words(monkeypatch, stage: str) -> None:
+    """Beside the buttons and the time that is left "sharpening edges ..." was "sh..."."""
+    long = f"{stage}: photo 128 of 300"
+    job = Job("Reconstructing", long, 0.5, started=20.0, done=(("photos", 10.0),), pausable=True)
+    state = replace(with_photos(MANY).with_scene(job=job), now=100.0)
+    rows = Rows(monkeypatch)
+    with headless.context((1280, 800)):
+        theme.set_up(1.0, "dark")
+
+        def panel(look: Look) -> None:
+            imgui.set_next_window_size(ImVec2(PANEL_WIDTHS[0], 600))
+            imgui.begin("panel", None, widgets.PLAIN)
+            tray.draw(state, look)
+            imgui.end()
+
+        headless.frames(panel, headless.look())
+        assert said(long) in [row.words for row in rows.now() if not clipped(row)]
 
 
 def with_photos(paths: tuple[Path, ...]) -> State:
@@ -228,11 +250,13 @@ def test_a_lens_that_was_found_is_said(items: Items) -> None:
     real = imgui.text_wrapped
     with headless.context((800, 700)), pytest.MonkeyPatch.context() as patch:
         patch.setattr(imgui, "text_wrapped", lambda text: (words.append(text), real(text)))
-        patch.setattr(tray, "_badge", lambda look, at, text, *rest: words.append(text))
+        patch.setattr(imgui, "set_tooltip", words.append)
         theme.set_up(1.0)
+        imgui.get_style().hover_flags_for_tooltip_mouse = 0  # at once
         hands.frames(4)
         hands.click(*middle(items, "card"))
-    assert "70°" in words and "65°" not in words
+    tip = "0.jpg\nField of view 70°, found from the photos, ± 0.1\nClick to set its lens, drag to reorder"
+    assert tip in words, "a bare 70° stood on the picture"
     assert "Field of view of the longer side, found from the photos, ± 0.1" in words
 
 
