@@ -172,7 +172,7 @@ def test_moved_things_are_found_where_they_are(chosen: State, info) -> None:
     assert marks is not None
     size, focal = (224, 168), 0.5 * 224 / np.tan(np.radians(30))
     at = (112 + focal * (CHAIR[0] + 0.5) / (CHAIR[2] - 0.2), 84 + focal * CHAIR[1] / (CHAIR[2] - 0.2))
-    (found,) = FindThing(1, info.memory, marks, at, made.scene.pose, size, "replace").run(lambda: False)
+    *_, found = FindThing(1, info.memory, marks, at, made.scene.pose, size, "replace").run(lambda: False)
     assert isinstance(found, ThingFound) and len(found.levels[found.chosen] & BLOCK) == 2500
     (weighed,) = WeighAtoms(1, info.scene, marks).run(lambda: False)
     assert isinstance(weighed, AtomsWeighed) and weighed.places[0] is not None

@@ -25,6 +25,7 @@ def home(tmp_path: Path, monkeypatch) -> Path:
         (pictures / f"toy_{side}.png").write_bytes((PHOTOS / f"toy_{side}.png").read_bytes())
     monkeypatch.setenv("HOME", str(tmp_path))
     monkeypatch.setenv("LANGFLASH_STATE", str(tmp_path / "state"))  # no other test's session is offered
+    monkeypatch.setenv("LANGFLASH_CONFIG", str(tmp_path / "config"))  # nor begun where another one opened
     return pictures
 
 

@@ -57,4 +57,4 @@ def test_cancel_and_find_stand_still_from_stage_to_stage(display: str, photos, f
     before, *during, after = json.loads(done.stdout)
     assert len(during) == 7 and all(each == during[0] for each in during)
     assert "Cancel" not in before and "Cancel" in during[0]
-    assert before["##text"] == during[0]["##text"] == after["##text"]
+    assert before["##text"] == after["##text"]
