@@ -13,6 +13,7 @@ import pytest
 import torch
 from torch import Tensor
 
+from app.gl.scene import Thinned
 from app.window import commands as do
 from app.window.asking import commands as ask
 from app.window.commands import apply
@@ -55,7 +56,10 @@ GIVEN = {
     ("name", tuple): ("a view",),
 }  # what else would be no answer
 TABLES = {Picture: PICTURES, Output: OFFERED}
-LAZY = {each.__name__: each for each in (CompiledQuery, Scene, Tensor)}  # known to the type checker alone
+LAZY = {  # known to the type checker alone
+    **{each.__name__: each for each in (CompiledQuery, Scene, Tensor)},
+    "Fewer": Thinned,
+}
 SIZE = (64, 48)  # pixels of the picture that regions are drawn on
 
 
@@ -135,6 +139,7 @@ MADE: dict = {
     Marks: lambda chance, state: state.editing.marks,
     CompiledQuery: lambda chance, state: compile_query(scene_of(state), language_space("minilm"), ["wall"]),
     Scene: lambda chance, state: scene_of(state),
+    Thinned: lambda chance, state: Thinned(scene_of(state), np.arange(2)),
     do.Command: lambda chance, state: show.ClearPhotos(),
     SceneInfo: lambda chance, state: state.scene.info,
     Pose: lambda chance, state: state.scene.pose,
