@@ -14,7 +14,7 @@ from tests.tools import monkey
 from tests.tools.memory import held_mb
 
 pytestmark = test_window.pytestmark
-SECONDS = 8.0
+SECONDS = 15.0
 
 
 def test_random_input_breaks_nothing() -> None:
