@@ -230,11 +230,7 @@ def surface_of(scene: Scene) -> Surface:
 
 
 def _surface_rows(scene: Scene) -> Scene:
-    """Those that show `LEVELLING.samples` points of the surface.
-
-    Raises:
-        InputError: there is no surface.
-    """
+    """Those that show `LEVELLING.samples` points of the surface."""
     areas = covered_areas(scene.gaussians)
     areas = np.where(np.isfinite(scene.gaussians.means.numpy()).all(1), np.nan_to_num(areas), 0.0)
     total = float(areas.sum())

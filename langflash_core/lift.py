@@ -161,11 +161,7 @@ def _look_at_views(
     see: Sees,
     told: _Telling,
 ) -> _Looked:
-    """Draw views, have the network look at them, or at photos from their places, and carry that back.
-
-    Raises:
-        InputError: they show nothing of the scene, or the network sees nothing in them.
-    """
+    """Draw views, have the network look at them, or at photos from their places, and carry that back."""
     frames = []
     for index, camera in enumerate(cameras):
         told("drawing", 0.3 * index / len(cameras))
@@ -259,9 +255,7 @@ def _check(cancelled: Callable[[], bool]) -> None:
 
 
 def _check_shown(frames: Sequence[Frame]) -> None:
-    """Raises:
-    InputError: the first view, or most of them, show nothing.
-    """
+    """Raises InputError: the first view, or most of them, show nothing."""
     shown = [float((frame.alphas >= LIFTING.covered).float().mean()) for frame in frames]
     if not shown or not shown[0] or sum(share > 0.02 for share in shown) * 2 <= len(shown):
         raise InputError(
@@ -350,11 +344,7 @@ def _contributions(scene: Scene, camera: Camera, draw: Renderer) -> list[tuple[T
 
 
 def _add_language(scene: Scene, looked: _Looked, calibration: dict) -> Scene:
-    """The scene with its language.
-
-    Raises:
-        InputError: no view shows anything of it.
-    """
+    """The scene with its language."""
     seen = looked.totals >= LIFTING.seen
     if not bool(seen.any()):
         raise InputError("no view shows a Gaussian of the scene; check the poses")

@@ -309,11 +309,7 @@ def _of_tour(scene: Scene) -> tuple[Stop | Note, ...]:
 def _page_phrases(
     scene: Scene, texts: Sequence[str], num_asked: int, threshold: float | None, with_text: bool
 ) -> "Phrases":
-    """What a page answers of a scene.
-
-    Raises:
-        PromptError: a text or the threshold cannot be used.
-    """
+    """What a page answers of a scene."""
     from langflash_core.export.html import Phrases
     from langflash_core.meant import check_threshold
 
@@ -336,11 +332,7 @@ def _page_phrases(
 
 
 def _text_model() -> "TextModel":
-    """The shipped tower as a page takes it.
-
-    Raises:
-        WeightsError: its files are missing or damaged.
-    """
+    """The shipped tower as a page takes it."""
     from langflash_core.export.html import TextModel
 
     weights, _ = shipped_files()

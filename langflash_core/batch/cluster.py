@@ -105,11 +105,7 @@ class _Server:
 
 
 def _check_address(address: str) -> None:
-    """Knock where a port is named: Ray itself would for minutes.
-
-    Raises:
-        InputError: nobody answers.
-    """
+    """Knock where a port is named: Ray itself would for minutes."""
     host, colon, port = address.removeprefix("ray://").rpartition(":")
     if not colon or not port.isdecimal():
         return

@@ -106,11 +106,7 @@ def open_scene(scene: Scene | Path | str) -> Scene:
 
 
 def _told_axes(path: Path, axes: str | None, error: type[LangFlashError]) -> dict[str, str]:
-    """What a reader or writer is told of axes.
-
-    Raises:
-        LangFlashError: of the type `error`: there are no such axes, or the file has its format's.
-    """
+    """What a reader or writer is told of axes."""
     if axes is None:
         return {}
     if kind_of(path) != ".spz":

@@ -125,11 +125,7 @@ class PosedPhotos:
         return replace(self, viewmats=torch.stack(viewmats), Ks=torch.stack(Ks), sizes=sizes)
 
     def _row(self, photo: Path, there: bool) -> int:
-        """Which pose is a photo's. there: the folder holds photos of these poses, so its others have none.
-
-        Raises:
-            SceneFileError: none, or several may be.
-        """
+        """Which pose is a photo's. there: the folder holds photos of these poses, so its others have none."""
         own, names = photo.resolve(), [PurePosixPath(name).parts for name in self.names]
         folder = self.folder.resolve()
         alike = [row for row, parts in enumerate(names) if parts[-1:] == (photo.name,)]
@@ -273,11 +269,7 @@ def _format_numbers(numbers) -> str:
 
 
 def _shape(path: Path) -> tuple[tuple[int, int], int]:
-    """Size and orientation of a photo, as stored.
-
-    Raises:
-        SceneFileError: it is missing or no picture.
-    """
+    """Size and orientation of a photo, as stored."""
     try:
         with opened_picture(path) as picture:
             return stored_shape(picture)
@@ -296,9 +288,7 @@ def _told_path(photo: Path) -> str:
 
 
 def _colmap(path: Path) -> PosedPhotos:
-    """Raises:
-    OSError: a file is missing. SceneFileError: too much. Any of `_DAMAGE`: it holds something else.
-    """
+    """Raises OSError: a file is missing. SceneFileError: too much. Any of `_DAMAGE`: it holds something else."""
     seen = read_model(path)
     names = [_portable(each.name) for each in seen]
     places = [place / _IMAGES for place in (path.parent, *list(path.parent.parents)[:2])] + [path.parent]
@@ -314,9 +304,7 @@ def _portable(name: str) -> str:
 
 
 def _transforms(path: Path) -> PosedPhotos:
-    """Raises:
-    OSError: the file is missing. Any of `_DAMAGE`: it holds something else.
-    """
+    """Raises OSError: the file is missing. Any of `_DAMAGE`: it holds something else."""
     document = json.loads("\n".join(text_lines(path)))
     paths, viewmats, Ks, sizes = [], [], [], []
     for frame in document["frames"]:
@@ -345,9 +333,7 @@ def _transforms(path: Path) -> PosedPhotos:
 
 
 def _check_lens(own: dict, name: str) -> None:
-    """Raises:
-    ValueError: the lens of a frame is no pinhole.
-    """
+    """Raises ValueError: the lens of a frame is no pinhole."""
     flags = [flag for flag in _OTHER_LENSES if own.get(flag)]
     model = str(own.get("camera_model") or "OPENCV").upper()
     bends = [float(own.get(key) or 0) for key in _BENDS]
@@ -378,9 +364,7 @@ def _size(own: dict, file: Path) -> tuple[int, int]:
 
 
 def _check(posed: PosedPhotos) -> None:
-    """Raises:
-    ValueError: poses are no rotations, or lenses none.
-    """
+    """Raises ValueError: poses are no rotations, or lenses none."""
     rotations = posed.viewmats[:, :3, :3]
     wrong = (rotations @ rotations.transpose(1, 2) - torch.eye(3, dtype=torch.float64)).abs().amax()
     if not (bool(torch.isfinite(posed.viewmats).all()) and float(wrong) < 1e-2):

@@ -180,9 +180,7 @@ class _Bytes:
         self.name, self._content, self._at = path.name, path.read_bytes(), 0
 
     def take(self, layout: str) -> tuple:
-        """Raises:
-        struct.error: the file ends before.
-        """
+        """Raises struct.error: the file ends before."""
         values = struct.unpack_from("<" + layout, self._content, self._at)
         self._at += struct.calcsize("<" + layout)
         return values
@@ -206,17 +204,13 @@ class _Bytes:
         return self._content[start:end].decode("utf-8")
 
     def skip(self, count: int, size: int) -> None:
-        """Raises:
-        ValueError: the file ends before.
-        """
+        """Raises ValueError: the file ends before."""
         if count > (len(self._content) - self._at) // size:
             raise ValueError(f"{self.name} ends before the {count:,} points that it promises")
         self._at += count * size
 
     def check_end(self) -> None:
-        """Raises:
-        ValueError: something follows, so what was read is in doubt.
-        """
+        """Raises ValueError: something follows, so what was read is in doubt."""
         if self._at != len(self._content):
             raise ValueError(f"{self.name} goes on after its last record")
 

@@ -86,11 +86,7 @@ def write_compressed_ply(scene: Scene, path: Path) -> None:
 
 
 def _check_elements(places: dict[str, tuple[int, int, np.dtype]], name: str) -> int:
-    """How many f_rest there are.
-
-    Raises:
-        SceneFileError: an element or property is missing, or counts disagree.
-    """
+    """How many f_rest there are."""
     empty = (0, 0, np.dtype([]))
     (_, chunks, bounds), (_, count, words) = places.get("chunk", empty), places.get("vertex", empty)
     _, rest_count, rest = places.get("sh", empty)

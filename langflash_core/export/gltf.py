@@ -94,11 +94,7 @@ class _Splats:
 
 
 def _primitives(document: Document) -> list[_Splats]:
-    """Every primitive of Gaussians, of which all is understood that says where they are and how they look.
-
-    Raises:
-        SceneFileError: something else is said of one. ValueError: it is damaged.
-    """
+    """Every primitive of Gaussians, of which all is understood that says where they are and how they look."""
     found = []
     for mesh, node, matrix in document.placed_meshes():
         for primitive in mesh["primitives"]:
@@ -110,9 +106,8 @@ def _primitives(document: Document) -> list[_Splats]:
 
 
 def _check_understood(document: Document, primitive: dict[str, Any]) -> None:
-    """Raises:
-    SceneFileError: an extension of the Gaussians' own, a part that is missing, or one that is not known.
-    """
+    """Raises SceneFileError: an extension of the Gaussians' own, a part that is missing, or one that is not
+    known."""
     attributes = primitive["attributes"]
     others = [name for name in extensions(primitive) if name not in (EXTENSION, LANGUAGE)]
     inner = list(extensions(primitive["extensions"][EXTENSION]))
@@ -166,11 +161,7 @@ def _oddities(splats: _Splats, name: str, logs: bool) -> Iterator[str]:
 
 
 def _stores_logarithms(document: Document, splats: _Splats) -> bool:
-    """Whether scales are logarithms: most are below 0, which no length is.
-
-    Raises:
-        SceneFileError: some are below 0.
-    """
+    """Whether scales are logarithms: most are below 0, which no length is."""
     index = splats.attributes[_NAMES["SCALE"]]
     below = sum(int((document.numbers(index, 3, some) < 0).sum()) for some in _parts(splats))
     if 0 < below <= 1.5 * len(splats.some):

@@ -132,9 +132,8 @@ class Document:
             raise ValueError("its nodes go round in circles")
 
     def check_drawn_once(self, mesh: dict[str, Any], node: dict[str, Any]) -> None:
-        """Raises:
-        SceneFileError: it is bent by joints or targets, or repeated: its numbers alone are another thing.
-        """
+        """Raises SceneFileError: it is bent by joints or targets, or repeated: its numbers alone are another
+        thing."""
         weights = node.get("weights") or mesh.get("weights") or ()
         for there, what in (
             ("skin" in node, "a skin"),
@@ -205,11 +204,7 @@ class Document:
         return np.ndarray((count, width), dtype, content, start, (stride, dtype.itemsize))
 
     def _buffer(self, index: int, filled_by: Sequence[str]) -> memoryview:
-        """The bytes of a buffer. filled_by: extensions that would have them, where it has none itself.
-
-        Raises:
-            SceneFileError: only an extension, or a file that is not there, has its bytes.
-        """
+        """The bytes of a buffer. filled_by: extensions that would have them, where it has none itself."""
         described = self.item("buffers", index)
         if index not in self._buffers:
             uri, own = described.get("uri"), self._own if index == 0 else None
@@ -226,11 +221,7 @@ class Document:
         return content
 
     def _fetch(self, uri: str) -> bytes:
-        """What an address names: bytes in it, or a file beside this one; percent-encoded as addresses are.
-
-        Raises:
-            SceneFileError: the file is not there.
-        """
+        """What an address names: bytes in it, or a file beside this one; percent-encoded as addresses are."""
         if uri[:5].lower() == "data:":
             kind, _, packed = uri.partition(",")
             plain = unquote_to_bytes(packed)

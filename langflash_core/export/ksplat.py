@@ -79,9 +79,7 @@ def read_ksplat(path: Path) -> Scene:
 
 
 def _sections(headers: bytes, room: int, level: int, size: int, name: str) -> list[_Section]:
-    """Raises:
-    SceneFileError: one does not fit into the file.
-    """
+    """Raises SceneFileError: one does not fit into the file."""
     sections, start = [], BUCKETS.header + room * BUCKETS.section
     for index in range(room):
         if not any(headers[index * BUCKETS.section : (index + 1) * BUCKETS.section]):

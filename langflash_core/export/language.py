@@ -100,11 +100,7 @@ def with_language(scene: Scene, block: bytes, name: str) -> Scene:
 
 
 def _unpack(block: bytes) -> tuple[dict[str, torch.Tensor], dict]:
-    """Tensors and the header's JSON.
-
-    Raises:
-        Any of `_DAMAGE`: it is no such block.
-    """
+    """Tensors and the header's JSON."""
     length = int.from_bytes(block[:8], "little")
     header = json.loads(block[8 : 8 + length])["__metadata__"]
     if header["format"] != _FORMAT or header["version"] != str(_VERSION):

@@ -88,9 +88,7 @@ def error_line(error: BaseException) -> str:
 
 
 def check_some(gaussians: Gaussians, path: Path) -> None:
-    """Raises:
-    OutputError: there is nothing to write.
-    """
+    """Raises OutputError: there is nothing to write."""
     if not len(gaussians):
         raise OutputError(f"cannot write {path.name}: the scene holds no Gaussians; keep some of them")
 

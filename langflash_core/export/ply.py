@@ -149,11 +149,7 @@ def _encode(gaussians: Gaussians, shift: Shift | None, comments: list[str]) -> I
 
 
 def _read_layout(stream: BinaryIO, name: str) -> _Layout:
-    """Where the Gaussians are.
-
-    Raises:
-        SceneFileError: it is no PLY, or no binary one with Gaussians in it.
-    """
+    """Where the Gaussians are."""
     order, elements, body, own = read_elements(stream, name)
     before = 0
     for index, (element, count, fields) in enumerate(elements):

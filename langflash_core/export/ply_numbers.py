@@ -124,11 +124,7 @@ def block(rows: np.ndarray, names: tuple[str, ...], kind: type = np.float32) -> 
 
 
 def _halves(rows: np.ndarray, name: str) -> tuple[np.dtype, tuple[str, ...]]:
-    """The type of rows with ushort as halves where a Gaussian's numbers are so, and what is to be said.
-
-    Raises:
-        SceneFileError: they are whole numbers otherwise.
-    """
+    """The type of rows with ushort as halves where a Gaussian's numbers are so, and what is to be said."""
     row = rows.dtype
     own = [
         field
@@ -185,11 +181,7 @@ def _shift(rows: np.ndarray, head: bytes) -> Shift | None:
 
 
 def _brightest(colours: np.ndarray, kinds: set[str], name: str) -> float:
-    """What white is among plain colours (n, 3) of these types.
-
-    Raises:
-        SceneFileError: nobody can tell.
-    """
+    """What white is among plain colours (n, 3) of these types."""
     low, high = float(colours.min()), float(colours.max())
     floats = all(kind.startswith("float") for kind in kinds) and low >= 0
     if floats and high <= 1:

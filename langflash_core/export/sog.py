@@ -109,9 +109,7 @@ def _at_most(stream, most: int, name: str) -> bytes:
 
 
 def _read_folder(name: str, open_file: _Opener) -> Scene:
-    """Raises:
-    SceneFileError: another version. Any of `_DAMAGE`: something does not fit.
-    """
+    """Raises SceneFileError: another version. Any of `_DAMAGE`: something does not fit."""
     meta = json.loads(open_file(SOG_FOLDER, SOG_LIMITS.most_meta))
     if meta.get("version") != 2:
         raise SceneFileError(

@@ -131,11 +131,7 @@ def write_spz(scene: Scene, path: Path, *, version: int | None = None, axes: str
 
 
 def _unpack_gzip(content: bytes, name: str) -> tuple[_Header, list[bytes], bytes]:
-    """Header, attribute streams and extensions of version 2 or 3.
-
-    Raises:
-        SceneFileError: another version, or cut off.
-    """
+    """Header, attribute streams and extensions of version 2 or 3."""
     head = inflate(content, _HEAD.size, name, wbits=31)
     header = _header(head, name)
     if header.version not in (2, 3):
@@ -161,11 +157,7 @@ def _unpack_gzip(content: bytes, name: str) -> tuple[_Header, list[bytes], bytes
 
 
 def _unpack_zstd(content: bytes, name: str) -> tuple[_Header, list[bytes], bytes]:
-    """Header, attribute streams and extensions of version 4.
-
-    Raises:
-        SceneFileError: another version, no zstd, or cut off.
-    """
+    """Header, attribute streams and extensions of version 4."""
     header = _header(content, name)
     if header.version != 4:
         raise SceneFileError(
@@ -192,9 +184,7 @@ def _unpack_zstd(content: bytes, name: str) -> tuple[_Header, list[bytes], bytes
 
 
 def _header(head: bytes, name: str) -> _Header:
-    """Raises:
-    SceneFileError: it is no .spz header, or one of no Gaussians.
-    """
+    """Raises SceneFileError: it is no .spz header, or one of no Gaussians."""
     if len(head) < _HEAD.size or head[:4] != _MAGIC:
         raise SceneFileError(f"{name} is not a .spz file, whatever its name says; {_REMEDY}")
     header = _Header(*_HEAD.unpack(head[: _HEAD.size])[1:])
@@ -207,9 +197,7 @@ def _header(head: bytes, name: str) -> _Header:
 
 
 def _check_shrinking(needed: int, found: int, name: str) -> None:
-    """Raises:
-    SceneFileError: no packer could have made so much so small.
-    """
+    """Raises SceneFileError: no packer could have made so much so small."""
     if needed > PACKING.most_shrinking * found:
         raise SceneFileError(
             f"{name} is damaged: it says to hold {needed:,} bytes and has {found:,}; {_REMEDY}"
@@ -217,11 +205,7 @@ def _check_shrinking(needed: int, found: int, name: str) -> None:
 
 
 def _named_axes(extensions: bytes, name: str) -> str | None:
-    """The axes that the records of an extension area name.
-
-    Raises:
-        SceneFileError: they are none that are known, or the records go on beyond what is there.
-    """
+    """The axes that the records of an extension area name."""
     start = 0
     while start + 8 <= len(extensions):
         kind, size = struct.unpack_from("<II", extensions, start)
@@ -285,11 +269,7 @@ def _signed_three(stored: np.ndarray) -> np.ndarray:
 
 
 def _encode(gaussians: Gaussians, version: int, name: str, axes: str) -> tuple[_Header, list[bytes]]:
-    """Header and attribute streams.
-
-    Raises:
-        OutputError: a Gaussian lies too far away.
-    """
+    """Header and attribute streams."""
     furthest = float(gaussians.means.abs().max())
     if furthest >= 1 << 23:
         raise OutputError(

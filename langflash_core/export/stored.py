@@ -82,11 +82,7 @@ class Gathering:
 
 
 def _check_memory(most: int, num_bases: int, name: str) -> None:
-    """Before the work: where memory runs out on the way, the system may end the program.
-
-    Raises:
-        SceneFileError: too little is free for so many Gaussians.
-    """
+    """Before the work: where memory runs out on the way, the system may end the program."""
     needed, free = 4 * most * (11 + 3 * num_bases) * STORED.copies, free_memory()
     if free is not None and needed > free:
         sizes = f"take {needed / 1e9:.1f} GB to open, and {max(free, 0) / 1e9:.1f} GB are free"

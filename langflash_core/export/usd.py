@@ -118,11 +118,7 @@ _Prim = tuple[Rows, np.ndarray, str, Encoding]
 
 
 def _prim(part: Part, name: str) -> _Prim:
-    """A prim's arrays in its own axes, where it stands (4, 4), the stage's axes, and how colours are encoded.
-
-    Raises:
-        ValueError, TypeError, KeyError: their lengths disagree, or the stage's axis is none.
-    """
+    """A prim's arrays in its own axes, where it stands (4, 4), the stage's axes, and how colours are encoded."""
     means, quats, scales, opacities, flat = (part.arrays[name] for name in (*ARRAYS, HARMONICS))
     count, degree = len(means), part.facts["degree"]
     bases = (degree + 1) ** 2 if degree is not None and 0 <= degree <= 10 else 0

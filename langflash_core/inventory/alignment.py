@@ -53,10 +53,8 @@ class Fit:
 
 
 def align_scenes(first: Inventory, second: Inventory, render: Render) -> Fit:
-    """Raises:
-    InputError: a scene holds no photos, too few of their key points match, or lengths that were told for both
-        differ by too much.
-    """
+    """Raises InputError: a scene holds no photos, too few of their key points match, or lengths that were
+    told for both differ by too much."""
     for found in (first, second):
         if not found.scene.photos:
             raise InputError("scenes are compared by their photos, and one has none; name scenes of photos")

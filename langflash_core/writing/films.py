@@ -49,9 +49,7 @@ from langflash_core.writing.settings import FILMING
 
 
 def check_encoder() -> None:
-    """Raises:
-    InputError: the optional package that writes videos is missing.
-    """
+    """Raises InputError: the optional package that writes videos is missing."""
     try:
         import imageio_ffmpeg  # noqa: F401
     except ImportError:
@@ -120,9 +118,7 @@ def way(
 
 
 def _stops(scene: Scene) -> list[Pose]:
-    """Raises:
-    ViewError: the scene has none.
-    """
+    """Raises ViewError: the scene has none."""
     stops = read_tour(scene.record.tour).stops
     if not stops:
         raise ViewError('the scene has no tour; give it stops with: langflash tour stop SCENE "The window"')

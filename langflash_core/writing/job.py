@@ -106,9 +106,7 @@ class Job:
 
 
 def check_found(answers: list[Answers]) -> None:
-    """Raises:
-    PromptError: no view answers any phrase.
-    """
+    """Raises PromptError: no view answers any phrase."""
     if not any(answer.found for view in answers for answer in view):
         asked = ", ".join(answer.prompt for answer in answers[0])
         where = "this view" if len(answers) == 1 else "any view"

@@ -89,11 +89,7 @@ def _of_photos(scene: Scene) -> Tensor:
 
 
 def _beside(job: Job) -> dict[str, Scene]:
-    """Other scenes of a page by their names, each as fine as the first.
-
-    Raises:
-        LangFlashError: one cannot be read, or two have the same name.
-    """
+    """Other scenes of a page by their names, each as fine as the first."""
     scenes: dict[str, Scene] = {}
     own = (job.request.scene or job.request.output).stem
     for path in job.request.beside:

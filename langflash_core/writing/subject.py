@@ -73,9 +73,7 @@ def taken_apart(
     numbers: Sequence[int | None],
     renderer: Renderer,
 ) -> Subject:
-    """Raises:
-    PromptError: nothing in the scene answers, or it finds more than a palette has colours.
-    """
+    """Raises PromptError: nothing in the scene answers, or it finds more than a palette has colours."""
     found = segments.segment(scene, prompts, threshold=threshold)
     if not found.things:
         raise PromptError(
