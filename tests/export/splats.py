@@ -1,6 +1,8 @@
 """Small random splats, and a PLY writer of the tests' own that can also write what is wrong."""
 
+import json
 import struct
+from pathlib import Path
 
 import numpy as np
 import torch
@@ -74,6 +76,21 @@ def ply_bytes(
         "end_header",
     ]
     return "\n".join(lines).encode() + b"\n" + before + rows.tobytes() + after
+
+
+def glb_parts(path: Path) -> tuple[dict, bytes]:
+    """The JSON and the buffer of a .glb."""
+    content = path.read_bytes()
+    size = struct.unpack_from("<I", content, 12)[0]
+    return json.loads(content[20 : 20 + size]), content[28 + size :]
+
+
+def glb_column(path: Path, accessor: int, kind: str, width: int) -> np.ndarray:
+    """Rows of an accessor of a .glb."""
+    document, buffer = glb_parts(path)
+    described = document["accessors"][accessor]
+    start = document["bufferViews"][described["bufferView"]]["byteOffset"]
+    return np.frombuffer(buffer, kind, described["count"] * width, start).reshape(-1, width)
 
 
 def damaged_files() -> dict[str, tuple[bytes, str]]:

@@ -6,7 +6,6 @@ Photos and scenes hold sRGB values. What others take for linear must be linear, 
 import gzip
 import io
 import json
-import struct
 import subprocess
 import zipfile
 from dataclasses import replace
@@ -18,13 +17,13 @@ import torch
 from PIL import Image
 
 from langflash_core.export import export, glb, png, read, spz
-from langflash_core.export.colours import label_colours, linear
+from langflash_core.export.colours import label_colours
 from langflash_core.geometry.fusion import Surface
 from langflash_core.geometry.harmonics import SH_C0
 from langflash_core.scene.bare import bare_scene
 from langflash_core.types import Frame, Scene
 from langflash_core.writing.encoding import open_encoder
-from tests.export.splats import random_gaussians
+from tests.export.splats import glb_column, glb_parts, random_gaussians
 
 SRGB = (200, 60, 30)  # of 255
 LINEAR = (0.577580, 0.045186, 0.012983)  # IEC 61966-2-1 by hand: ((c + .055) / 1.055) ** 2.4
@@ -39,70 +38,64 @@ def scene() -> Scene:
     return bare_scene(replace(gaussians, sh=sh), "made")
 
 
-def glb_json(content: bytes) -> tuple[dict, bytes]:
-    size = struct.unpack_from("<I", content, 12)[0]
-    return json.loads(content[20 : 20 + size]), content[28 + size :]
-
-
-def column(content: bytes, accessor: int, kind: str, width: int) -> np.ndarray:
-    document, buffer = glb_json(content)
-    described = document["accessors"][accessor]
-    start = document["bufferViews"][described["bufferView"]]["byteOffset"]
-    return np.frombuffer(buffer, kind, described["count"] * width, start).reshape(-1, width)
-
-
-def stored_colour(kind: str, path: Path) -> np.ndarray:
-    """The first Gaussian's colour in the numbers that its format stores, by the format's own description."""
+def first_numbers(kind: str, path: Path) -> tuple:
+    """Position and colour of the one Gaussian of a file, in the numbers that its format stores."""
     content = path.read_bytes()
     if kind == ".ply":
-        return np.frombuffer(content.split(b"end_header\n")[1], "<f4")[6:9]  # behind positions and normals
+        rows = np.frombuffer(content.split(b"end_header\n")[1], "<f4")
+        return rows[:3], rows[6:9]  # behind positions and normals
     if kind == ".compressed.ply":
         chunk = np.frombuffer(content.split(b"end_header\n")[1], "<f4", 18)
-        return chunk[12:15]  # the least of red, green, blue of its 256
+        return chunk[:3], chunk[12:15]  # the least of its 256
     if kind == ".splat":
-        return np.frombuffer(content, "u1")[24:27]
+        return np.frombuffer(content, "<f4", 3), np.frombuffer(content, "u1")[24:27]
     if kind == ".spz":
-        return np.frombuffer(gzip.decompress(content), "u1")[16 + 9 * 8 + 8 :][:3]  # positions, then alphas
+        body = gzip.decompress(content)
+        steps = [int.from_bytes(body[16 + 3 * a : 19 + 3 * a], "little", signed=True) for a in range(3)]
+        return np.array(steps) / 2 ** body[13], np.frombuffer(body, "u1")[16 + 9 + 1 :][:3]
     if kind == ".sog":
         with zipfile.ZipFile(path) as archive:
-            book = np.array(json.loads(archive.read("meta.json"))["sh0"]["codebook"])
+            meta = json.loads(archive.read("meta.json"))
             places = np.asarray(Image.open(io.BytesIO(archive.read("sh0.webp"))).convert("RGBA"))
-        return book[places[0, 0, :3]]
+        lowest = np.array(meta["means"]["mins"])
+        return np.sign(lowest) * np.expm1(abs(lowest)), np.array(meta["sh0"]["codebook"])[places[0, 0, :3]]
     if kind == ".glb":
-        attributes = glb_json(content)[0]["meshes"][0]["primitives"][0]["attributes"]
-        return column(content, attributes["KHR_gaussian_splatting:SH_DEGREE_0_COEF_0"], "<f4", 3)[0]
-    first = content.decode().split("sphericalHarmonicsCoefficients = [(")[1].split(")")[0]
-    return np.array([float(number) for number in first.split(",")])
+        document, _ = glb_parts(path)
+        attributes = document["meshes"][0]["primitives"][0]["attributes"]
+        colour = attributes["KHR_gaussian_splatting:SH_DEGREE_0_COEF_0"]
+        return document["accessors"][0]["min"], glb_column(path, colour, "<f4", 3)[0]
+    numbers = (
+        content.decode().split(f"{name} = [(")[1].split(")")[0].split(",")
+        for name in ("positions", "sphericalHarmonicsCoefficients")
+    )
+    return tuple(np.array(some, float) for some in numbers)
 
 
 @pytest.mark.parametrize(
-    ("kind", "expected", "within"),
+    ("kind", "place", "colour", "within"),
     [
-        (".ply", BASE, 1e-6),
-        (".compressed.ply", np.array(SRGB) / 255, 1e-6),
-        (".splat", SRGB, 0),
-        (".spz", np.round((BASE * 0.15 + 0.5) * 255), 0),
-        (".sog", BASE, 0.02),  # one of 256 numbers between the least and the largest, 2.4 apart at most
-        (".glb", BASE, 1e-6),
-        (".usda", BASE, 1e-5),  # seven digits of text
+        (".ply", [1, 2, 3], BASE, 1e-6),
+        (".compressed.ply", [1, 2, 3], np.array(SRGB) / 255, 1e-6),
+        (".splat", [1, 2, 3], SRGB, 0),
+        (".spz", [1, -2, -3], np.round((BASE * 0.15 + 0.5) * 255), 0),
+        (".sog", [1, 2, 3], BASE, 1e-6),
+        (".glb", [-1, -2, 3], BASE, 1e-6),
+        (".usda", [1, -2, -3], BASE, 1e-5),  # seven digits of text
     ],
 )
-def test_splats_hold_srgb_values(scene, tmp_path, kind, expected, within):
+def test_axes_and_srgb_values_in_the_files_themselves(scene, tmp_path, kind, place, colour, within):
+    """One to the right, two down, three ahead."""
     if kind == ".usda":
         pytest.importorskip("pxr")
+    one = scene.gaussians.rows(torch.tensor([0]))
+    one = bare_scene(replace(one, means=torch.tensor([[1.0, 2.0, 3.0]])), "made")
     path = tmp_path / f"a{kind}"
-    spz.write_spz(scene, path, version=3) if kind == ".spz" else export(scene, path)
-    assert np.abs(stored_colour(kind, path) - expected).max() <= within
+    spz.write_spz(one, path, version=3) if kind == ".spz" else export(one, path)
+    found = first_numbers(kind, path)
+    np.testing.assert_allclose(found[0], place, atol=1e-4)
+    assert np.abs(found[1] - colour).max() <= within
     shown = 0.5 + SH_C0 * read(path).gaussians.sh[:, 0].numpy()
-    assert np.abs(shown - np.array(SRGB) / 255).max() < 1.5 / 255 + 0.3 * within
-
-
-def test_splats_say_srgb_where_the_kind_can(scene, tmp_path):
-    export(scene, tmp_path / "a.glb")
-    primitive = glb_json((tmp_path / "a.glb").read_bytes())[0]["meshes"][0]["primitives"][0]
-    assert primitive["extensions"]["KHR_gaussian_splatting"]["colorSpace"] == "srgb_rec709_display"
-    points = column((tmp_path / "a.glb").read_bytes(), primitive["attributes"]["COLOR_0"], "<u2", 4)
-    assert np.abs(points[:, :3] / 65535 - LINEAR).max() < 1e-5  # what draws points takes them for linear
+    assert np.abs(shown - np.array(SRGB) / 255).max() < 1.5 / 255
 
 
 def test_a_stage_says_srgb_in_a_word_that_openusd_knows(scene, tmp_path):
@@ -159,11 +152,11 @@ def test_a_surface_is_linear_in_16_bits_and_no_metal(tmp_path):
     corners = np.array([[0.0, 0, 1], [1, 0, 1], [0, 1, 1]])
     colours = np.array([SRGB, (0, 0, 0), (255, 255, 255)], np.uint8)
     glb.write_surfaces([("wall", Surface(corners, np.array([[0, 2, 1]]), colours))], tmp_path / "a.glb")
-    document, _ = glb_json((tmp_path / "a.glb").read_bytes())
+    document, _ = glb_parts(tmp_path / "a.glb")
     (primitive,) = document["meshes"][0]["primitives"]
     described = document["accessors"][primitive["attributes"]["COLOR_0"]]
     assert described["componentType"] == 5123 and described["normalized"] is True
-    stored = column((tmp_path / "a.glb").read_bytes(), primitive["attributes"]["COLOR_0"], "<u2", 4)
+    stored = glb_column(tmp_path / "a.glb", primitive["attributes"]["COLOR_0"], "<u2", 4)
     assert np.abs(stored[0, :3] / 65535 - LINEAR).max() < 1e-5
     assert stored[1].tolist() == [0, 0, 0, 65535] and stored[2].tolist() == [65535] * 4
     material = document["materials"][primitive["material"]]
@@ -175,7 +168,7 @@ def test_boxes_have_the_colours_of_their_labels(tmp_path):
     """A factor of a material is linear; the same label in a picture is sRGB."""
     box = {"center": [0, 0, 1], "axes": np.eye(3).tolist(), "size": [1, 1, 1]}
     glb.write_boxes([("chair", box), ("lamp", box)], tmp_path / "a.glb")
-    document, _ = glb_json((tmp_path / "a.glb").read_bytes())
+    document, _ = glb_parts(tmp_path / "a.glb")
     for material, colour in zip(document["materials"], label_colours(2), strict=True):
         factor = material["pbrMetallicRoughness"]["baseColorFactor"]
         shown = [1.055 * part ** (1 / 2.4) - 0.055 for part in factor[:3]]
@@ -204,8 +197,3 @@ def test_films_say_their_matrix(tmp_path, size):
     plane = np.frombuffer(subprocess.run([program, *words], capture_output=True).stdout, "u1")
     luma = 16 + 219 / 255 * np.dot((0.2126, 0.7152, 0.0722), SRGB)  # 91.0; of BT.601 it would be 100
     assert abs(float(plane[: size[0] * size[1]].mean()) - luma) < 2  # rounding, and what the encoder loses
-
-
-def test_linear_is_the_standards(tmp_path):
-    np.testing.assert_allclose(linear(np.array(SRGB) / 255), LINEAR, atol=1e-6)
-    assert linear(np.array([0.0, 0.04045, 1.0])).tolist() == [0.0, 0.04045 / 12.92, 1.0]

@@ -311,6 +311,10 @@ def repeated(file: File) -> None:
     node_of(file).setdefault("extensions", {})["EXT_mesh_gpu_instancing"] = {"attributes": {}}
 
 
+def stretched(file: File) -> None:
+    node_of(file)["scale"] = [1, 2, 1]
+
+
 def of_the_future(file: File) -> None:
     file.json["asset"]["minVersion"] = "2.1"
 
@@ -322,7 +326,7 @@ NEEDED: tuple[tuple[Callable[[File], None], str], ...] = (
     (unknown_part, f"{SPLATS}:LOBE_0"), (no_rotation, f"without {SPLATS}:ROTATION"),
     (half_floats, "type 5131"), (another_buffer, "has no bytes"), (a_file_that_is_gone, "'gone away.bin'"),
     (a_file_elsewhere, "elsewhere"), (skinned, "a skin"), (morphed, "morph targets"),
-    (repeated, "EXT_mesh_gpu_instancing"), (of_the_future, "glTF 2.1"),
+    (repeated, "EXT_mesh_gpu_instancing"), (of_the_future, "glTF 2.1"), (stretched, "unevenly"),
 )  # fmt: skip
 
 

@@ -36,14 +36,15 @@ pytestmark = needs_browser
 
 ASKED = ("armchair", "wall", "piano")
 LEAST_DB, LEAST_IOU = 30.0, 0.95
-_PICTURE = """langflash.then((page) => {
-  const text = (numbers) => {
+TEXT = """const text = (numbers) => {
     const bytes = new Uint8Array(numbers.buffer);
     let letters = "";
     for (let at = 0; at < bytes.length; at += 32768)
       letters += String.fromCharCode(...bytes.subarray(at, at + 32768));
     return btoa(letters);
-  };
+  };"""
+_PICTURE = """langflash.then((page) => {
+  TEXT
   const { colours, answer } = page.picture(VIEW, SIZE, PHRASE);
   return { colours: text(colours), ...answer, relevance: answer && text(answer.relevance) };
 })"""
@@ -64,7 +65,7 @@ class Drawn:
 def drawn(page: Browser, view: int, size: tuple[int, int], phrase: str | None = None) -> Drawn:
     """What the page draws of a photo's view."""
     words = {"VIEW": view, "SIZE": list(size), "PHRASE": phrase}
-    script = _PICTURE
+    script = _PICTURE.replace("TEXT", TEXT)
     for name, value in words.items():
         script = script.replace(name, "undefined" if value is None else json.dumps(value))
     found = page.value(script)
@@ -282,6 +283,12 @@ def test_one_gaussian(page, tmp_path):
     assert page.errors == []
 
 
+def scores(page: Browser, rows: list[int]) -> list[float]:
+    """What the page judges some of its phrases to be."""
+    judged = f"[...page.judge({rows}, page.shown(1)).values()].map((answer) => answer.score)"
+    return page.value(f"langflash.then((page) => {judged})")
+
+
 def test_more_phrases_than_a_pass_takes(page, tmp_path):
     """Nine numbers a pass: |f| and eight phrases; each is answered as alone."""
     mixed = cloud(800, num_atoms=5, degree=0, dtype=torch.float32)
@@ -289,14 +296,9 @@ def test_more_phrases_than_a_pass_takes(page, tmp_path):
     write_html(mixed, tmp_path / "many.html", phrases=phrases_of(mixed, texts))
     page.open(tmp_path / "many.html", (240, 200))
     page.value(_READY)
-
-    def scores(rows: list[int]) -> list[float]:
-        judged = f"[...page.judge({rows}, page.shown(1)).values()].map((answer) => answer.score)"
-        return page.value(f"langflash.then((page) => {judged})")
-
-    together = scores(list(range(11)))
+    together = scores(page, list(range(11)))
     for row in (0, 8, 10):
-        assert together[row] == pytest.approx(scores([row])[0], abs=1e-6)
+        assert together[row] == pytest.approx(scores(page, [row])[0], abs=1e-6)
 
 
 def test_names_are_text(page, tmp_path):

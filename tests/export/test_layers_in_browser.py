@@ -18,7 +18,7 @@ from langflash_core.splat import compose, reference
 from langflash_core.types import Camera, Record, Scene
 from tests.app.window.scenes import PHRASES, VIEW_SIZE, room
 from tests.export.browser import Browser, needs_browser
-from tests.export.test_html_in_browser import _READY, check_answer, decibels, shown, until
+from tests.export.test_html_in_browser import _READY, TEXT, check_answer, decibels, scores, shown, until
 from tests.splat.scenes import turned
 
 pytestmark = needs_browser
@@ -32,12 +32,10 @@ _PICTURE = """langflash.then((page) => {
   page.drawing.moving = MOVING;
   page.drawing.splat(target, CAMERA, { pinhole: PINHOLE, size: SIZE }, null);
   page.drawing.moving = false;
-  const bytes = new Uint8Array(page.drawing.read(target, 0).buffer);
+  TEXT
+  const picture = text(page.drawing.read(target, 0));
   page.drawing.release(target);
-  let letters = "";
-  for (let at = 0; at < bytes.length; at += 32768)
-    letters += String.fromCharCode(...bytes.subarray(at, at + 32768));
-  return btoa(letters);
+  return picture;
 })"""
 
 
@@ -112,7 +110,7 @@ def drawn(page: Browser, camera: Camera, moving: bool = False) -> np.ndarray:
         "CAMERA": {"eye": eye, "turn": viewmat[:3, :3].tolist()},
         "PINHOLE": [K[0][0], K[1][1], K[0][2], K[1][2]],
     }
-    script = _PICTURE
+    script = _PICTURE.replace("TEXT", TEXT)
     for name, value in words.items():
         script = script.replace(name, json.dumps(value))
     content = np.frombuffer(base64.b64decode(page.value(script)), np.float32)
@@ -158,14 +156,9 @@ def test_more_phrases_than_a_pass_takes(page, file):
     """Five beside |f| and the place; the first of the second pass is answered as alone."""
     page.open(file, (96, 72))
     page.value(_READY)
-
-    def scores(rows: list[int]) -> list[float]:
-        judged = f"[...page.judge({rows}, page.shown(1)).values()].map((answer) => answer.score)"
-        return page.value(f"langflash.then((page) => {judged})")
-
-    together = scores(list(range(7)))
+    together = scores(page, list(range(7)))
     assert len(together) == 7
-    assert together[5] == pytest.approx(scores([5])[0], abs=1e-6)
+    assert together[5] == pytest.approx(scores(page, [5])[0], abs=1e-6)
     assert page.errors == []
 
 

@@ -5,7 +5,7 @@ import json
 import struct
 import zipfile
 from dataclasses import replace
-from itertools import permutations
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +15,6 @@ import torch
 from langflash_core.base.formats import AXES
 from langflash_core.errors import OutputError, SceneFileError
 from langflash_core.export import export, read, spz
-from langflash_core.export.stored import ANTIALIASED, PLAIN
 from langflash_core.scene.bare import bare_scene
 from langflash_core.scene.joining import join_scenes
 from langflash_core.scene.standing import on_its_head
@@ -47,25 +46,14 @@ def ply(folder: Path, header: str = "", **columns: np.ndarray) -> Scene:
 
 
 @pytest.mark.parametrize("antialiased", [True, False])
-@pytest.mark.parametrize(("first", "second"), [*permutations(KINDS, 2), *((kind, kind) for kind in KINDS)])
-def test_the_mark_makes_the_way_through_every_pair_of_formats(tmp_path, first, second, antialiased):
+@pytest.mark.parametrize(("first", "second"), [*pairwise(KINDS), (KINDS[-1], KINDS[0])])
+def test_the_mark_makes_the_way_out_of_and_into_every_format(tmp_path, first, second, antialiased):
     one, two = named(tmp_path / "one", first), named(tmp_path / "two", second)
     export(made(antialiased), one)
     export(read(one), two)
     record = read(two).record
     assert record.antialiased is antialiased
-    splat_files = {first, second} != {".langflash"}  # a scene file alone has nothing to say that was not said
-    assert record.warnings.count(SAID) == int(antialiased and splat_files)
-
-
-@pytest.mark.parametrize("version", [2, 3, 4])
-def test_every_version_of_spz_has_the_bit(tmp_path, version):
-    if version == 4:
-        pytest.importorskip("zstandard")
-    spz.write_spz(made(), tmp_path / "a.spz", version=version)
-    content = (tmp_path / "a.spz").read_bytes()
-    assert (content if version == 4 else gzip.decompress(content))[14] == 1
-    assert read(tmp_path / "a.spz").record.antialiased
+    assert record.warnings.count(SAID) == int(antialiased)
 
 
 def test_the_marks_stand_where_other_programs_look_for_them(tmp_path):
@@ -76,6 +64,10 @@ def test_the_marks_stand_where_other_programs_look_for_them(tmp_path):
         assert b"\ncomment SplatRenderMode: mip\n" in header
     with zipfile.ZipFile(tmp_path / "a.sog") as archive:
         assert json.loads(archive.read("meta.json"))["model"] == "antialiased"
+    for version in (2, 3):
+        spz.write_spz(made(), tmp_path / "a.spz", version=version)
+        assert gzip.decompress((tmp_path / "a.spz").read_bytes())[14] == 1
+        assert read(tmp_path / "a.spz").record.antialiased
 
 
 @pytest.mark.parametrize(
@@ -286,15 +278,6 @@ def test_every_axes_make_the_round_trip(tmp_path, axes):
     assert found.record.warnings == ()
 
 
-def test_without_a_word_the_file_is_the_format_s_own(tmp_path):
-    scene = bare_scene(ahead(), "made")
-    spz.write_spz(scene, tmp_path / "a.spz", version=3)
-    plain = gzip.decompress((tmp_path / "a.spz").read_bytes())
-    assert plain[14] == 0
-    down = int.from_bytes(plain[19:22], "little", signed=True) / (1 << plain[13])
-    assert down == pytest.approx(-float(scene.gaussians.means[0, 1]), abs=1e-4)
-
-
 def test_a_file_that_names_its_axes_is_believed(tmp_path):
     scene = bare_scene(ahead(), "made")
     export(scene, tmp_path / "a.spz", axes="rub")
@@ -346,7 +329,3 @@ def test_nothing_that_is_seen_hangs_nowhere():
     assert not on_its_head(replace(half_around(faint), opacities=torch.zeros(len(faint))))
     one = half_around(faint).map(lambda values: values[:1])
     assert on_its_head(one) and not on_its_head(half_around(one))
-
-
-def test_models_are_called_as_sog_calls_them():
-    assert (PLAIN, ANTIALIASED) == ("default", "antialiased")

@@ -13,30 +13,12 @@ from langflash_core.export import export, read
 from langflash_core.export.settings import STORED
 from langflash_core.scene.bare import bare_scene
 from langflash_core.scene.checks import check_scene
-from tests.export.splats import damaged_files, ply_bytes, random_gaussians, stored_columns
-
-DAMAGED = damaged_files()
+from tests.export.splats import ply_bytes, random_gaussians, stored_columns
 
 
 def written(tmp_path, gaussians):
     export(bare_scene(gaussians, "made"), tmp_path / "a.ply")
     return tmp_path / "a.ply"
-
-
-@pytest.mark.parametrize("degree", [0, 1, 2, 3])
-def test_a_round_trip_loses_nothing(tmp_path, degree):
-    before = random_gaussians(300, degree)
-    scene = read(written(tmp_path, before))
-    check_scene(scene)
-    after = scene.gaussians
-    assert torch.equal(after.means, before.means) and torch.equal(after.sh, before.sh)
-    # Quaternions are normalised once more, and float32 has 6e-8 between values near 1.
-    assert torch.allclose(after.quats, before.quats, atol=2e-7)
-    # A logarithm up to 13 keeps 5e-7 of absolute precision in float32, so exp() that much relative.
-    assert torch.allclose(after.scales, before.scales, rtol=2e-6, atol=0)
-    # Logits end at 16.1, where 1e-7 of opacity is left; between, sigmoid halves the logit's rounding.
-    assert torch.allclose(after.opacities, before.opacities, atol=3e-7)
-    assert scene.semantics.num_atoms == 0 and scene.record.warnings == ()
 
 
 def test_another_reader_finds_what_the_convention_says(tmp_path):
@@ -101,23 +83,15 @@ def test_lines_may_end_as_on_windows(tmp_path):
     assert len(read(tmp_path / "a.ply").gaussians) == 50
 
 
-def test_opacities_that_are_no_logits_are_taken_as_they_are(tmp_path):
+def test_opacities_and_scales_that_are_activated_are_taken_as_they_are(tmp_path):
     columns = stored_columns()
     columns["opacity"] = np.linspace(0, 1, 50, dtype=np.float32)
+    columns |= {f"scale_{axis}": np.exp(columns[f"scale_{axis}"]) for axis in range(3)}
     (tmp_path / "a.ply").write_bytes(ply_bytes(columns))
     scene = read(tmp_path / "a.ply")
     assert np.array_equal(scene.gaussians.opacities.numpy(), columns["opacity"])
-    assert len(scene.record.warnings) == 1 and "opacities" in scene.record.warnings[0]
-
-
-def test_scales_that_are_no_logarithms_are_taken_as_they_are(tmp_path):
-    columns = stored_columns()
-    for axis in range(3):
-        columns[f"scale_{axis}"] = np.exp(columns[f"scale_{axis}"])
-    (tmp_path / "a.ply").write_bytes(ply_bytes(columns))
-    scene = read(tmp_path / "a.ply")
     assert np.allclose(scene.gaussians.scales[:, 0].numpy(), columns["scale_0"])
-    assert len(scene.record.warnings) == 1 and "scales" in scene.record.warnings[0]
+    assert ["opacities" in said for said in scene.record.warnings] == [True, False]
 
 
 def test_a_scene_in_millimetres_is_not_taken_for_one_with_linear_scales(tmp_path):
@@ -165,17 +139,6 @@ def test_quaternions_of_any_length_become_unit(tmp_path):
     quats = read(tmp_path / "a.ply").gaussians.quats
     assert quats[0].tolist() == [1, 0, 0, 0]
     assert torch.allclose(quats.norm(dim=-1), torch.ones(50))
-
-
-@pytest.mark.parametrize("kind", DAMAGED)
-def test_damaged_files_are_refused_in_one_sentence(tmp_path, kind):
-    content, word = DAMAGED[kind]
-    (tmp_path / "bad.ply").write_bytes(content)
-    with pytest.raises(SceneFileError) as caught:
-        read(tmp_path / "bad.ply")
-    sentence = str(caught.value)
-    assert sentence.startswith("bad.ply ") and word in sentence
-    assert "\n" not in sentence and ("; " in sentence)
 
 
 def test_more_rows_than_are_read_at_once(tmp_path, monkeypatch):

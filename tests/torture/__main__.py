@@ -12,76 +12,75 @@ import sys
 import tempfile
 import time
 import warnings
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from concurrent.futures import ThreadPoolExecutor, as_completed
 from pathlib import Path
 
+from tests.torture.rows import Row, report
 
-def files(args: argparse.Namespace, folder: Path) -> int:
+
+def files(args: argparse.Namespace, folder: Path) -> Iterator[Row]:
     """Hostile files: `fuzz.py`."""
     from tests.torture import fuzz
 
     words = ["--seed", str(args.seed), "--count", str(args.files)]
-    return fuzz.main([*words, *(word for name in args.only or () for word in ("--reader", name))])
+    code = fuzz.main([*words, *(word for name in args.only or () for word in ("--reader", name))])
+    yield Row("hostile files", "as above", ["as above"] * code)
 
 
-def calls(args: argparse.Namespace, folder: Path) -> int:
+def calls(args: argparse.Namespace, folder: Path) -> Iterator[Row]:
     """The n-th call fails: `nth.py`."""
     from tests.torture.jobs import prepared
-    from tests.torture.nth import everything, report
+    from tests.torture.nth import everything
 
     jobs = [job for job in prepared(folder) if any(job.name.startswith(name) for name in args.only or [""])]
-    return report(everything(jobs, folder, 60 * _minutes(args, CALLS_MINUTES), args.seed), sys.stdout.write)
+    return everything(jobs, folder, 60 * _minutes(args, CALLS_MINUTES), args.seed)
 
 
-def kills(args: argparse.Namespace, folder: Path) -> int:
+def kills(args: argparse.Namespace, folder: Path) -> Iterator[Row]:
     """Killed at random moments: `kills.py`."""
-    from tests.torture.kills import everything, report
+    from tests.torture.kills import everything
 
-    return report(everything(folder, args.count, args.seed), sys.stdout.write)
+    return everything(folder, args.count, args.seed)
 
 
-def together(args: argparse.Namespace, folder: Path) -> int:
+def together(args: argparse.Namespace, folder: Path) -> Iterator[Row]:
     """Two programs at once: `together.py`."""
-    from tests.torture.kills import report
     from tests.torture.together import everything
 
-    return report(everything(folder, args.rounds, args.seed), sys.stdout.write, "times")
+    return everything(folder, args.rounds, args.seed)
 
 
-def photos(args: argparse.Namespace, folder: Path) -> int:
+def photos(args: argparse.Namespace, folder: Path) -> Iterator[Row]:
     """Photos that no scene is in, or that deceive: `hard_photos.py`."""
-    from tests.torture.hard_photos import everything, report
+    from tests.torture.hard_photos import everything
 
-    return report(everything(folder, args.only), sys.stdout.write)
+    return everything(folder, args.only)
 
 
-def window(args: argparse.Namespace, folder: Path) -> int:
+def window(args: argparse.Namespace, folder: Path) -> Iterator[Row]:
     """The window while the driver and the disk refuse: `window.py`."""
     from tests.torture.jobs import prepared
-    from tests.torture.nth import report
     from tests.torture.window import opened, torture
 
     prepared(folder)
     (folder / "out").mkdir()
     with opened(folder / "in" / "s.langflash", folder / "out") as session:
-        return report(
-            torture(session, folder, 60 * _minutes(args, WINDOW_MINUTES), args.seed), sys.stdout.write
-        )
+        yield from torture(session, folder, 60 * _minutes(args, WINDOW_MINUTES), args.seed)
 
 
-def load(args: argparse.Namespace, folder: Path) -> int:
+def load(args: argparse.Namespace, folder: Path) -> Iterator[Row]:
     """Much at once, and often: `load.py`."""
-    from tests.torture.load import everything, report
+    from tests.torture.load import everything
 
-    return report(everything(folder, args.questions, args.only), sys.stdout.write)
+    return everything(folder, args.questions, args.only)
 
 
-def address(args: argparse.Namespace, folder: Path) -> int:
+def address(args: argparse.Namespace, folder: Path) -> Iterator[Row]:
     """Addresses of pages: `address.py`."""
-    from tests.torture.address import report
+    from tests.torture.address import everything
 
-    return report(folder, args.addresses, args.seed, sys.stdout.write)
+    return everything(folder, args.addresses, args.seed)
 
 
 CALLS_MINUTES, WINDOW_MINUTES = 7, 3
@@ -149,11 +148,10 @@ def main() -> int:
     for name in args.parts or PARTS:
         began, spent = time.monotonic(), processor()
         with tempfile.TemporaryDirectory() as folder:
-            finds += PARTS[name](args, Path(folder))
+            finds += report(PARTS[name](args, Path(folder)), sys.stdout.write)
         say = f"{name}: {processor() - spent:.0f} s of the processor in {time.monotonic() - began:.0f} s\n"
         sys.stdout.write(say)
         sys.stdout.flush()
-    sys.stdout.write(f"{finds} finds\n")
     return 1 if finds else 0
 
 

@@ -5,12 +5,12 @@ comes is a view and a phrase that the page has.
 """
 
 import json
-import time
-from collections.abc import Callable
+from collections.abc import Iterator
 from pathlib import Path
 
 from langflash_core import pipeline
 from tests.export.browser import browser
+from tests.torture.rows import Row
 
 READER = Path(pipeline.__file__).parent / "export" / "page" / "address.js"
 AT_ONCE = 100_000
@@ -65,11 +65,7 @@ def torture(folder: Path, count: int, seed: int) -> list[tuple[str, str]]:
     return finds
 
 
-def report(folder: Path, count: int, seed: int, say: Callable[[str], object]) -> int:
-    """One line; how many finds."""
-    began = time.monotonic()
-    finds = torture(folder, count, seed)
-    say(f"{count:,} addresses in {time.monotonic() - began:.0f} s, {len(finds)} finds\n")
-    for hash_, wrong in finds[:10]:
-        say(f"    {json.dumps(hash_)}: {wrong}\n")
-    return len(finds)
+def everything(folder: Path, count: int, seed: int) -> Iterator[Row]:
+    """The one row."""
+    finds = [f"{json.dumps(found)}: {wrong}" for found, wrong in torture(folder, count, seed)]
+    yield Row("addresses", f"{count:,}", finds)

@@ -1,5 +1,5 @@
-"""The n-th call of a kind fails, below our code: where Python asks the system, numpy or torch for memory, and
-moderngl the driver. None of our own functions is replaced.
+"""The n-th call of a kind fails, below our code: where Python asks the system, torch for memory, and moderngl
+the driver. None of our own functions is replaced.
 
     with failing("write", 3, folder, errno.ENOSPC) as fault: ...
 
@@ -9,7 +9,6 @@ film, OpenUSD a stage) is not seen by "place", "write" and "read"; `small_disk` 
 """
 
 import builtins
-import ctypes
 import io
 import os
 import signal
@@ -17,7 +16,6 @@ import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager, nullcontext
 from dataclasses import dataclass
-from importlib import import_module
 from pathlib import Path
 from typing import Any
 
@@ -27,7 +25,7 @@ KINDS = {
     "place": "make, open to write, rename or remove a file or folder",
     "write": "write into a file, or fsync it",
     "read": "open a file to read, read of it, list a folder",
-    "memory": "allocate 1 MiB or more for a tensor of torch or an array of numpy",
+    "memory": "allocate 1 MiB or more for a tensor of torch",
     "graphics": "make a context, texture, buffer, framebuffer or program of OpenGL",
     "lost": "the same, but from the n-th on every one fails: the context is lost",
 }
@@ -192,13 +190,7 @@ def small_disk(size: int) -> Iterator[None]:
 # --- memory ---------------------------------------------------------------------------------------
 
 
-@contextmanager
-def _memory(fault: Fault) -> Iterator[None]:
-    with _torch_memory(fault), _numpy_memory(fault):
-        yield
-
-
-def _torch_memory(fault: Fault):
+def _memory(fault: Fault):
     """Every operation of torch in this thread whose result is new and large."""
     import torch
     from torch.utils._python_dispatch import TorchDispatchMode
@@ -226,90 +218,6 @@ def _torch_memory(fault: Fault):
             return result
 
     return Mode()
-
-
-class _Allocator(ctypes.Structure):
-    """PyDataMem_Handler of numpy's C interface."""
-
-    _fields_ = (
-        ("name", ctypes.c_char * 127), ("version", ctypes.c_uint8), ("ctx", ctypes.c_void_p),
-        ("malloc", ctypes.c_void_p), ("calloc", ctypes.c_void_p), ("realloc", ctypes.c_void_p),
-        ("free", ctypes.c_void_p),
-    )  # fmt: skip
-
-
-_KEPT: list[object] = []  # arrays that outlive the fault are freed by the functions that made them
-_HANDLER = b"mem_handler"
-_SET_HANDLER = 304  # its place in numpy's table of functions (numpy/_core/code_generators/numpy_api.py)
-
-
-@contextmanager
-def _numpy_memory(fault: Fault) -> Iterator[None]:
-    """numpy gets its memory from the C library through functions that can say no; in this thread."""
-    if not _KEPT:
-        _KEPT.extend(_handler())
-    capsule, ask = _KEPT[0], _KEPT[1]
-    ask.fault = fault  # type: ignore[attr-defined]
-    before = _set_handler(capsule)
-    try:
-        yield
-    finally:
-        _set_handler(before)
-        ask.fault = None  # type: ignore[attr-defined]
-
-
-def _set_handler(capsule: object) -> object:
-    """Numpy takes memory from another handler from now on; the one before."""
-    return ctypes.PYFUNCTYPE(ctypes.py_object, ctypes.py_object)(_numpy_function(_SET_HANDLER))(capsule)
-
-
-def _numpy_function(place: int) -> int:
-    table = _pointer(import_module("numpy._core._multiarray_umath")._ARRAY_API, None)
-    return ctypes.cast(table, ctypes.POINTER(ctypes.c_void_p))[place]
-
-
-def _pointer(capsule: object, name: bytes | None) -> int:
-    get = ctypes.pythonapi.PyCapsule_GetPointer
-    get.restype, get.argtypes = ctypes.c_void_p, [ctypes.py_object, ctypes.c_char_p]
-    return get(capsule, name)
-
-
-class _Ask:
-    """Whether there is memory."""
-
-    fault: Fault | None = None
-
-    def __call__(self, wanted: int) -> bool:
-        if self.fault is None or wanted < LARGE:
-            return True
-        try:
-            self.fault.asks("memory", f"numpy {wanted} bytes", lambda _: MemoryError())
-        except MemoryError:
-            return False
-        return True
-
-
-def _handler() -> list[object]:
-    """numpy's own handler, asking first. Its `free` stays numpy's: it runs while an error is on its way,
-    which a function of Python would lose."""
-    usual = ctypes.PYFUNCTYPE(ctypes.py_object)(_numpy_function(_SET_HANDLER + 1))()
-    own = _Allocator.from_address(_pointer(usual, _HANDLER))
-    place, size = ctypes.c_void_p, ctypes.c_size_t
-    kinds = [ctypes.PYFUNCTYPE(place, place, *more) for more in ((size,), (size, size), (place, size))]
-    malloc, calloc, realloc = (
-        kind(call) for kind, call in zip(kinds, (own.malloc, own.calloc, own.realloc), strict=True)
-    )
-    ask = _Ask()
-    asking = [
-        kinds[0](lambda ctx, n: malloc(ctx, n) if ask(n) else None),
-        kinds[1](lambda ctx, n, each: calloc(ctx, n, each) if ask(n * each) else None),
-        kinds[2](lambda ctx, old, n: realloc(ctx, old, n) if ask(n) else None),
-    ]
-    addresses = [ctypes.cast(each, place).value for each in asking]
-    handler = _Allocator(b"torture", 1, own.ctx, *addresses, own.free)
-    make = ctypes.pythonapi.PyCapsule_New
-    make.restype, make.argtypes = ctypes.py_object, [place, ctypes.c_char_p, place]
-    return [make(ctypes.addressof(handler), _HANDLER, None), ask, usual, handler, *asking]
 
 
 # --- OpenGL ---------------------------------------------------------------------------------------

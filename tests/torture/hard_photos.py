@@ -9,7 +9,7 @@ there), so equal inputs are needed for equal outputs and a difference there says
 """
 
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
@@ -24,6 +24,7 @@ from langflash_core.errors import LangFlashError
 from langflash_core.images.views import load_views
 from langflash_core.network import GuidedDepthNet, load_network
 from langflash_core.types import Scene
+from tests.torture.rows import Row
 
 SIZE = 112  # about which the network sees, pixels a side
 WIDTH, HEIGHT = 320, 240
@@ -45,17 +46,6 @@ class Hard:
     photos: tuple[Picture, ...]
     fov: float | None = None
     none: bool = False
-
-
-@dataclass
-class Row:
-    """said: the sentence, or what came. errors: of each stage, beside float64."""
-
-    name: str
-    precision: str
-    said: str = ""
-    errors: dict[str, float] = field(default_factory=dict)
-    finds: list[str] = field(default_factory=list)
 
 
 def photo(name: str) -> Picture:
@@ -126,11 +116,11 @@ def _stripes(phase: int) -> Picture:
 
 def judged(hard: Hard, folder: Path, precision: str, twin: Callable[[list[Path]], "Stages"]) -> Row:
     """One set in one precision; twin: gives the stages in float64."""
-    row, paths = Row(hard.name, precision), written(hard, folder)
-    made(hard, paths, row)
-    row.errors = beside(stages(paths, precision), twin(paths))
-    bounds = BOUNDS[precision]
-    row.finds += [f"{n}: {e:.2g} > {bounds[n]}" for n, e in row.errors.items() if not e <= bounds[n]]
+    row, paths = Row(f"{hard.name}, {precision}"), written(hard, folder)
+    made(hard, paths, row, precision)
+    errors, bounds = beside(stages(paths, precision), twin(paths)), BOUNDS[precision]
+    row.told = "; ".join([*(f"{name} {error:.1e}" for name, error in errors.items()), row.told[:90]])
+    row.finds += [f"{n}: {e:.2g} > {bounds[n]}" for n, e in errors.items() if not e <= bounds[n]]
     return row
 
 
@@ -143,21 +133,21 @@ def written(hard: Hard, folder: Path) -> list[Path]:
     return paths
 
 
-def made(hard: Hard, paths: list[Path], row: Row) -> Scene | None:
+def made(hard: Hard, paths: list[Path], row: Row, precision: str = "float32") -> Scene | None:
     """The scene, or None where none came of it; what is wrong with that goes into the row."""
     try:
-        scene = pipeline.reconstruct(paths, fov=hard.fov, size=SIZE, precision=row.precision, detail="low")
+        scene = pipeline.reconstruct(paths, fov=hard.fov, size=SIZE, precision=precision, detail="low")
     except LangFlashError as error:
-        row.said = str(error)
-        if "\n" in row.said or not hard.none:
-            row.finds.append(f"refused: {row.said}")
+        row.told = str(error)
+        if "\n" in row.told or not hard.none:
+            row.finds.append(f"refused: {row.told}")
         return None
     except Exception as error:
         row.finds.append(f"{type(error).__name__}: {error}")
         return None
-    row.said = f"{len(scene.gaussians):,} Gaussians, {scene.semantics.num_atoms} groups"
+    row.told = f"{len(scene.gaussians):,} Gaussians, {scene.semantics.num_atoms} groups"
     if hard.none:
-        row.finds.append(f"a scene of nothing: {row.said}")
+        row.finds.append(f"a scene of nothing: {row.told}")
     row.finds += _wrong(scene)
     return scene
 
@@ -266,17 +256,3 @@ def everything(folder: Path, only: list[str] | None = None) -> Iterator[Row]:
 
         for precision in PRECISIONS:
             yield judged(hard, folder, precision, twin)
-
-
-def report(rows: Iterator[Row], say: Callable[[str], object]) -> int:
-    """The table; how many finds."""
-    finds = 0
-    names = ("tokens", "depth", "language", "masks")
-    say(f"{'photos':24}{'precision':10}" + "".join(f"{name:>10}" for name in names) + "  what came\n")
-    for row in rows:
-        errors = "".join(f"{row.errors.get(name, float('nan')):10.1e}" for name in names)
-        say(f"{row.name:24}{row.precision:10}{errors}  {row.said[:90]}\n")
-        for words in row.finds:
-            say(f"    {words[:300]}\n")
-        finds += len(row.finds)
-    return finds

@@ -16,7 +16,7 @@ import struct
 import time
 from collections.abc import Callable, Iterator
 from contextlib import suppress
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -36,20 +36,11 @@ from langflash_core.scene.edits import Mask, delete
 from langflash_core.types import Scene
 from tests.app.cli.conftest import stripes
 from tests.app.window.recovery.desk import Desk
+from tests.torture.rows import Counted
 
 ENDINGS = (".langflash", ".ply", ".spz", ".sog", ".glb", ".splat", ".compressed.ply", ".html")
 DONE = -(1 << 62)
 Say = Callable[[int], object]
-
-
-@dataclass
-class Row:
-    """Of one kind of work. kills: how many; inside: those that came before the work was done by itself."""
-
-    name: str
-    kills: int = 0
-    inside: int = 0
-    finds: list[str] = field(default_factory=list)
 
 
 def killed(work: Callable[[Say], None], seconds: float) -> tuple[list[int], bool]:
@@ -87,20 +78,17 @@ def killed(work: Callable[[Say], None], seconds: float) -> tuple[list[int], bool
 # --- while it writes ------------------------------------------------------------------------------
 
 
-def writing(folder: Path, count: int, rng: random.Random) -> Iterator[Row]:
+def writing(folder: Path, count: int, rng: random.Random) -> Iterator[Counted]:
     """Saves and exports over each other, a folder of answers, preferences, a session with its edits."""
-    rows = [
-        _over_each_other(folder / "files", count * 45 // 100, rng),
-        _folders(folder / "folders", count * 10 // 100, rng),
-        _preferred(count * 10 // 100, rng),
-        _autosaves(count * 35 // 100, rng),
-    ]
-    yield from rows
+    yield _over_each_other(folder / "files", count * 45 // 100, rng)
+    yield _folders(folder / "folders", count * 10 // 100, rng)
+    yield _preferred(count * 10 // 100, rng)
+    yield _autosaves(count * 35 // 100, rng)
 
 
-def _over_each_other(folder: Path, count: int, rng: random.Random) -> Row:
+def _over_each_other(folder: Path, count: int, rng: random.Random) -> Counted:
     """One file, written again and again by two scenes in turn."""
-    row, scenes = Row("save and export"), (stripes(), fewer(stripes()))
+    row, scenes = Counted("killed at: save and export"), (stripes(), fewer(stripes()))
     folder.mkdir(parents=True)
     known: dict[str, set[bytes]] = {}
     for ending in ENDINGS:
@@ -121,7 +109,7 @@ def _over_each_other(folder: Path, count: int, rng: random.Random) -> Row:
                     export(scene, path)
 
         _, inside = killed(work, rng.uniform(0, 0.08))
-        row.kills, row.inside = row.kills + 1, row.inside + inside
+        row.done(inside)
         if not path.is_file() or path.read_bytes() not in known[ending]:
             row.finds.append(f"{path.name} is neither of the two")
         export(scenes[0], path)
@@ -133,10 +121,10 @@ def fewer(scene: Scene) -> Scene:
     return edited_scene(scene, delete(first_marks(scene), some(scene, 0)))
 
 
-def _folders(folder: Path, count: int, rng: random.Random) -> Row:
+def _folders(folder: Path, count: int, rng: random.Random) -> Counted:
     """Ten files that belong together are put in place together: a kill between two of the moves is all that
     may part them, and then every one of them is whole."""
-    row = Row("a folder of files")
+    row = Counted("killed at: a folder of files")
     folder.mkdir(parents=True)
 
     def fill(number: int) -> None:
@@ -151,7 +139,7 @@ def _folders(folder: Path, count: int, rng: random.Random) -> Row:
 
     for _ in range(count):
         _, inside = killed(work, rng.uniform(0, 0.03))
-        row.kills, row.inside = row.kills + 1, row.inside + inside
+        row.done(inside)
         for path in filter(Path.is_file, (folder / "out").glob("*")):
             content = path.read_bytes()
             if len(content) != 20_000 or len(set(content)) != 1:
@@ -161,8 +149,8 @@ def _folders(folder: Path, count: int, rng: random.Random) -> Row:
     return row
 
 
-def _preferred(count: int, rng: random.Random) -> Row:
-    row = Row("preferences")
+def _preferred(count: int, rng: random.Random) -> Counted:
+    row = Counted("killed at: preferences")
 
     def work(say: Say) -> None:
         say(0)
@@ -172,7 +160,7 @@ def _preferred(count: int, rng: random.Random) -> Row:
     preferences.save(preferences.DEFAULTS)
     for _ in range(count):
         _, inside = killed(work, rng.uniform(0, 0.01))
-        row.kills, row.inside = row.kills + 1, row.inside + inside
+        row.done(inside)
         _, complaint = preferences.load()
         row.finds += [complaint] if complaint else []
         preferences.save(preferences.DEFAULTS)
@@ -248,20 +236,20 @@ def recovered(say: Say | None = None) -> Desk:
     return desk
 
 
-def _autosaves(count: int, rng: random.Random) -> Row:
-    row, scene = Row("autosave"), stripes()
+def _autosaves(count: int, rng: random.Random) -> Counted:
+    row, scene = Counted("killed at: autosave"), stripes()
     for _ in range(count):
         clean()
         done, inside = killed(lambda say: begin(scene, say, 40), rng.uniform(0, 0.4))
-        row.kills, row.inside = row.kills + 1, row.inside + inside
+        row.done(inside)
         row.finds += _lost(max(done))
     return row
 
 
-def recovering(count: int, rng: random.Random, again: bool) -> Row:
+def recovering(count: int, rng: random.Random, again: bool) -> Counted:
     """A window is killed with edits that nobody saved; the next is killed while it takes them over, and, with
     `again`, not before it has gone on editing."""
-    row = Row("recover, edit, kill again" if again else "while recovering")
+    row = Counted("killed at: recovery and edits" if again else "killed at: recovery")
     scene = stripes()
 
     def second(say: Say) -> None:
@@ -275,7 +263,7 @@ def recovering(count: int, rng: random.Random, again: bool) -> Row:
         clean()
         done, _ = killed(lambda say: begin(scene, say, 3), rng.uniform(0.05, 0.3))
         done2, inside = killed(second, rng.uniform(0, 0.5 if again else 0.2))
-        row.kills, row.inside = row.kills + 1, row.inside + inside
+        row.done(inside)
         row.finds += _lost(max(max(done), max(done2)))
     return row
 
@@ -294,6 +282,12 @@ def _lost(kept: int) -> list[str]:
     return finds
 
 
+def own_places(folder: Path) -> None:
+    """What programs remember goes into a folder from here on."""
+    for name in ("STATE", "CONFIG"):
+        os.environ[f"LANGFLASH_{name}"] = str(folder / name.lower())
+
+
 def clean() -> None:
     shutil.rmtree(state_folder(), ignore_errors=True)
 
@@ -302,24 +296,10 @@ def parts(folder: Path) -> list[str]:
     return [path.name for path in folder.rglob("*.part")] if folder.is_dir() else []
 
 
-def report(rows: Iterator[Row], say: Callable[[str], object], times: str = "kills") -> int:
-    """The table; how many finds. times: what is counted."""
-    finds = 0
-    say(f"{'what':28}{times:>7}{'at work':>9}{'finds':>7}\n")
-    for row in rows:
-        say(f"{row.name:28}{row.kills:7,}{row.inside:9,}{len(row.finds):7}\n")
-        for words in row.finds[:10]:
-            say(f"    {words}\n")
-        finds += len(row.finds)
-    return finds
-
-
-def everything(folder: Path, count: int, seed: int) -> Iterator[Row]:
+def everything(folder: Path, count: int, seed: int) -> Iterator[Counted]:
     """All rows: `count` kills while it writes, a fifth of them while it recovers, a fifth twice in a row."""
     rng = random.Random(seed)
-    os.environ["LANGFLASH_STATE"], os.environ["LANGFLASH_CONFIG"] = (
-        str(folder / "state"), str(folder / "config"),
-    )  # fmt: skip
+    own_places(folder)
     yield from writing(folder, count, rng)
     yield recovering(count // 5, rng, again=False)
     yield recovering(count // 5, rng, again=True)

@@ -9,8 +9,7 @@ and the names that OpenGL gives to new objects are counted then as well.
 import gc
 import os
 import threading
-import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Iterator, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -121,15 +120,3 @@ def _held(ctx) -> tuple[int, int, int, tuple[int, ...]]:
         each.release()
     resident = int(Path("/proc/self/statm").read_text().split()[1]) * os.sysconf("SC_PAGE_SIZE")
     return resident, len(os.listdir("/proc/self/fd")), threading.active_count(), names
-
-
-def report(rows: Iterator[Row], say: Callable[[str], object]) -> int:
-    """The table; how many finds."""
-    finds, began = 0, time.process_time()
-    for row in rows:
-        say(f"{row.name:32}{row.told}\n")
-        for words in row.finds:
-            say(f"    {words}\n")
-        finds += len(row.finds)
-    say(f"{time.process_time() - began:.0f} s of the processor\n")
-    return finds

@@ -15,14 +15,13 @@ import errno
 import gc
 import hashlib
 import io
-import itertools
 import json
 import os
 import random
 import shutil
 import traceback
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 
 import imageio_ffmpeg
@@ -34,6 +33,7 @@ from langflash_core.base.outputs import READERS, import_reference
 from langflash_core.base.resources import asset_path, shader_path
 from langflash_core.errors import LangFlashError
 from tests.torture.failing import Fault, failing, small_disk
+from tests.torture.rows import Row
 
 ERRORS = {
     "place": (errno.ENOSPC, errno.EROFS, errno.EXDEV, errno.ENOENT, errno.EACCES, errno.EIO),
@@ -62,19 +62,21 @@ class Job:
 
 
 @dataclass
-class Row:
+class Failed(Row):
     """Of a job and a kind. calls: of a whole run. tried: how many of them failed in turn; in `went` of them
     the work was done all the same."""
 
-    job: str
-    kind: str
     calls: int = 0
     tried: int = 0
     went: int = 0
-    finds: dict[str, str] = field(default_factory=dict)
+
+    def tell(self) -> "Failed":
+        """In words."""
+        self.told = f"{self.tried:,} of {self.calls:,} calls failed, {self.went:,} did no harm to the work"
+        return self
 
 
-def everything(jobs: Sequence[Job], folder: Path, seconds: float, seed: int = 1) -> Iterator[Row]:
+def everything(jobs: Sequence[Job], folder: Path, seconds: float, seed: int = 1) -> Iterator[Failed]:
     """Rows of all jobs in an order of the seed's; the processor's `seconds` are shared among those to come,
     and a job that none are left for is said to be left out, for another seed."""
     end = processor() + seconds
@@ -84,7 +86,7 @@ def everything(jobs: Sequence[Job], folder: Path, seconds: float, seed: int = 1)
         if left > 0:
             yield from torture(job, folder, left / (len(order) - place), seed)
         else:
-            yield Row(job.name, "left out")
+            yield Failed(job.name, "left out")
 
 
 def processor() -> float:
@@ -92,7 +94,7 @@ def processor() -> float:
     return sum(os.times()[:4])
 
 
-def torture(job: Job, folder: Path, seconds: float, seed: int = 1) -> Iterator[Row]:
+def torture(job: Job, folder: Path, seconds: float, seed: int = 1) -> Iterator[Failed]:
     """A row per kind; `seconds` for all of them."""
     out, new, old = folder / "out", folder / "new", folder / "old"
     for other, how in ((old, job.old), (new, job.run)):
@@ -103,7 +105,7 @@ def torture(job: Job, folder: Path, seconds: float, seed: int = 1) -> Iterator[R
         shutil.copytree(out, other)
     share = seconds / len(job.kinds)
     for kind in job.kinds:
-        row = Row(job.name, kind)
+        row = Failed(f"{job.name}: {kind}")
         began = processor()
         for nth in _numbers(job, folder, kind, row, share, seed):
             empty = job.fresh and (nth + seed) % 2 == 0
@@ -112,10 +114,10 @@ def torture(job: Job, folder: Path, seconds: float, seed: int = 1) -> Iterator[R
             if processor() - began > 3 * share:
                 break
         gc.collect()
-        yield row
+        yield row.tell()
 
 
-def _numbers(job: Job, folder: Path, kind: str, row: Row, share: float, seed: int) -> list[int]:
+def _numbers(job: Job, folder: Path, kind: str, row: Failed, share: float, seed: int) -> list[int]:
     """Which calls fail: all, or as many as there is time for, spread evenly."""
     if kind == "disk":
         row.calls = STEPS
@@ -141,7 +143,7 @@ def _fault(kind: str, nth: int, folder: Path) -> contextlib.AbstractContextManag
     return failing(kind, (nth - 1) // len(errors) + 1, places, errors[(nth - 1) % len(errors)])
 
 
-def _try(job: Job, folder: Path, kind: str, nth: int, row: Row, before: dict, new: dict) -> None:
+def _try(job: Job, folder: Path, kind: str, nth: int, row: Failed, before: dict, new: dict) -> None:
     row.tried += 1
     if kind == "disk":
         sizes = [path.stat().st_size for path in (folder / "new").rglob("*") if path.is_file()]
@@ -160,7 +162,7 @@ def _try(job: Job, folder: Path, kind: str, nth: int, row: Row, before: dict, ne
     wrong = _wrong(code, said) or _harm(job, folder / "out", before, new, code, failed)
     row.went += code == 0
     if wrong:
-        row.finds.setdefault(f"{wrong} [{fault.failed or nth}]", said)
+        row.find(f"{wrong} [{fault.failed or nth}]")
 
 
 def _wrong(code: int, said: str) -> str:
@@ -248,15 +250,3 @@ def _spoken(run: Callable[[Path], tuple[int, str]], folder: Path) -> tuple[int, 
         except LangFlashError as error:
             code, said = error.exit_code, f"langflash: {error}"
     return code, errors.getvalue() + said
-
-
-def report(rows: Iterator[Row], say: Callable[[str], object]) -> int:
-    """The table; how many finds."""
-    finds = 0
-    say(f"{'job':24}{'kind':10}{'calls':>7}{'failed':>8}{'done all the same':>19}{'finds':>7}\n")
-    for row in rows:
-        say(f"{row.job:24}{row.kind:10}{row.calls:7,}{row.tried:8,}{row.went:19,}{len(row.finds):7}\n")
-        for words in itertools.islice(row.finds, 12):
-            say(f"    {words}\n")
-        finds += len(row.finds)
-    return finds

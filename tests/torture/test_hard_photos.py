@@ -7,14 +7,15 @@ from langflash_core.errors import ImageError
 from langflash_core.images.settings import JUDGING
 from langflash_core.images.triage import check_shown
 from tests.torture import hard_photos
+from tests.torture.rows import Row
 
 
 @pytest.mark.parametrize("name", ["black", "constant"])
 def test_photos_of_nothing_make_no_scene(name, tmp_path):
     hard = next(each for each in hard_photos.sets() if each.name == name)
-    row = hard_photos.Row(name, "float32")
+    row = Row(name)
     assert hard_photos.made(hard, hard_photos.written(hard, tmp_path), row) is None
-    assert row.finds == [] and row.said.startswith("the photos show nothing")
+    assert row.finds == [] and row.told.startswith("the photos show nothing")
 
 
 def test_what_is_nearly_dark_is_still_taken():
@@ -29,7 +30,7 @@ def test_what_is_nearly_dark_is_still_taken():
 def test_two_photos_of_noise_make_a_finite_scene(tmp_path):
     """And what would not be finite is found."""
     hard = next(each for each in hard_photos.sets() if each.name == "noise")
-    row = hard_photos.Row(hard.name, "float32")
+    row = Row(hard.name)
     scene = hard_photos.made(hard, hard_photos.written(hard, tmp_path), row)
     assert scene is not None and row.finds == []
     scene.gaussians.means[3] = torch.nan

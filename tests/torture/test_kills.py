@@ -23,7 +23,7 @@ def test_a_few_kills_lose_nothing(own):
     rng = random.Random(3)
     rows = [*kills.writing(own, 20, rng), kills.recovering(2, rng, False), kills.recovering(2, rng, True)]
     assert [row.finds for row in rows] == [[]] * len(rows)
-    assert sum(row.kills for row in rows) == 24 and sum(row.inside for row in rows) > 12
+    assert sum(row.count for row in rows) == 24 and sum(row.inside for row in rows) > 12
 
 
 @pytest.mark.filterwarnings("ignore:This process")

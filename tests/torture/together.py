@@ -29,7 +29,8 @@ from langflash_core.language.lessons import Lesson, Lessons, read_lessons
 from langflash_core.scene.file import load, save
 from tests.app.cli.conftest import stripes
 from tests.torture.jobs import in_this_process, small_pair
-from tests.torture.kills import Row, Window, begin, clean, fewer, killed, make_edit, parts, recovered
+from tests.torture.kills import Window, begin, clean, fewer, killed, make_edit, own_places, parts, recovered
+from tests.torture.rows import Counted
 
 OWN = (  # settings that one of two windows changes, and one that both do
     {"theme": ("dark", "light"), "speed": (0.5, 1.0, 3.0), "dictionary_open": (True, False)},
@@ -39,26 +40,21 @@ BOTH = {"detail": ("low", "normal", "high")}
 _BATCH = ("--size", "84", "--gaussians", "1000", "--backend", "torch")
 
 
-def everything(folder: Path, count: int, seed: int) -> Iterator[Row]:
+def everything(folder: Path, count: int, seed: int) -> Iterator[Counted]:
     """All rows; count: how often each, but for batches, of which there is a twentieth."""
     rng = random.Random(seed)
-    os.environ["LANGFLASH_STATE"], os.environ["LANGFLASH_CONFIG"] = (
-        str(folder / "state"), str(folder / "config"),
-    )  # fmt: skip
-    yield _counted("saves of one scene", count, rng, lambda rng: saves(folder, rng))
-    yield _counted("preferences", count, rng, lambda rng: settings(folder, rng))
-    yield _counted("vocabulary", count, rng, lambda rng: taught(rng))
-    yield _counted("windows that die together", count, rng, lambda rng: windows(rng))
-    yield _counted("one scene, edited in both", count, rng, lambda rng: one_scene(folder, rng))
-    yield _counted("recovered by both at once", count, rng, lambda rng: both_recover(rng))
-    yield _counted("batch", max(1, count // 20), rng, lambda rng: batches(folder))
-
-
-def _counted(name: str, count: int, rng: random.Random, once: Callable[[random.Random], list[str]]) -> Row:
-    row = Row(name, count, count)
-    for _ in range(count):
-        row.finds += once(rng)
-    return row
+    own_places(folder)
+    for name, once in (
+        ("saves of one scene", lambda: saves(folder, rng)), ("preferences", lambda: settings(folder, rng)),
+        ("vocabulary", lambda: taught(rng)), ("windows that die together", lambda: windows(rng)),
+        ("one scene, edited in both", lambda: one_scene(folder, rng)),
+        ("recovered by both at once", lambda: both_recover(rng)), ("batch", lambda: batches(folder)),
+    ):  # fmt: skip
+        row = Counted(f"two at once: {name}")
+        for _ in range(count if name != "batch" else max(1, count // 20)):
+            row.finds += once()
+            row.done()
+        yield row
 
 
 def both(work: Callable[[int], object]) -> list[str]:

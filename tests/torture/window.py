@@ -28,7 +28,7 @@ from langflash_core.base.pictures import PICTURES
 from langflash_core.scene.edits import Mask
 from tests.app.window.test_window import x_server
 from tests.torture.failing import failing
-from tests.torture.nth import Row
+from tests.torture.nth import Failed
 
 SIZES = ((720, 520), (800, 560))  # by turns, so that targets are made anew
 KINDS = ("graphics", "lost", "write", "place")
@@ -57,10 +57,10 @@ def opened(scene: Path, folder: Path) -> Iterator[Session]:
             session.close()
 
 
-def torture(session: Session, folder: Path, seconds: float, seed: int = 1) -> Iterator[Row]:
+def torture(session: Session, folder: Path, seconds: float, seed: int = 1) -> Iterator[Failed]:
     """A row per kind of failure; `seconds` of the processor for all of them."""
     for kind in KINDS:
-        row, began, nth = Row("window", kind), time.process_time(), 0
+        row, began, nth = Failed(f"window: {kind}"), time.process_time(), 0
         while time.process_time() - began < seconds / len(KINDS) and nth < MOST:
             nth += 1
             failed = _one(session, folder, kind, nth, seed, row)
@@ -68,10 +68,10 @@ def torture(session: Session, folder: Path, seconds: float, seed: int = 1) -> It
             row.calls = max(row.calls, nth)
             if not failed and nth > 3:
                 break
-        yield row
+        yield row.tell()
 
 
-def _one(session: Session, folder: Path, kind: str, nth: int, seed: int, row: Row) -> bool:
+def _one(session: Session, folder: Path, kind: str, nth: int, seed: int, row: Failed) -> bool:
     """Use the window while something fails; whether it did."""
     before = _edits(session)
     with failing(kind, nth, folder, 28) as fault:
@@ -79,17 +79,17 @@ def _one(session: Session, folder: Path, kind: str, nth: int, seed: int, row: Ro
             _use(session, folder, nth + seed)
         except Exception as error:
             said = traceback.format_exception_only(error)[-1].strip()
-            row.finds.setdefault(f"the window died: {said} [{fault.failed}]", "")
+            row.find(f"the window died: {said} [{fault.failed}]")
     try:
         _steps(session, 4)
     except Exception as error:
-        row.finds.setdefault(f"it does not go on: {type(error).__name__}: {error} [{fault.failed}]", "")
+        row.find(f"it does not go on: {type(error).__name__}: {error} [{fault.failed}]")
     texts = [toast.text for toast in session.state.toasts]
     wrong = [text for text in texts if "unexpected" in text or "\n" in text]
     if wrong:
-        row.finds.setdefault(f"said: {wrong[0][:150]} [{fault.failed}]", "")
+        row.find(f"said: {wrong[0][:150]} [{fault.failed}]")
     if _edits(session) != before or session.should_close:
-        row.finds.setdefault(f"edits are gone [{fault.failed}]", "")
+        row.find(f"edits are gone [{fault.failed}]")
     return bool(fault.failed)
 
 
