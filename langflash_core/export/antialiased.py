@@ -10,6 +10,7 @@ Source: the formats as Brush, gsplat, splat-transform and Mip-Splatting write th
 """
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -18,7 +19,6 @@ from langflash_core.export.stored import ANTIALIASED, FLAT, PLAIN, Rows, logit
 from langflash_core.types import Scene
 
 _FILTER = "filter_3d"
-_COMMENT = "SplatRenderMode: mip"
 _MARK = re.compile(rb"^comment[ \t]+(?:splatrendermode:[ \t]*(\S+)|antialiased[ \t]+([01]))\s*$", re.I | re.M)
 _MODELS = {"mip": ANTIALIASED, "1": ANTIALIASED, "0": PLAIN}  # by what the comments say, where it differs
 _MOST_HEADER = 1 << 16  # bytes
@@ -35,7 +35,7 @@ def ply_model(path: Path) -> str:
 
 def ply_comments(scene: Scene) -> list[str]:
     """The lines of a PLY's header that say what the scene's splats are."""
-    return [f"comment {_COMMENT}"] if scene.record.antialiased else []
+    return ["comment SplatRenderMode: mip"] if scene.record.antialiased else []
 
 
 def filter_of(names: tuple[str, ...] | None) -> str | None:
@@ -55,4 +55,4 @@ def apply_filter(rows: Rows, radii: np.ndarray) -> Rows:
         wider = np.where(squares > 0, np.logaddexp(2 * logs, np.log(squares)) / 2, logs + squares)
         opacities = np.exp((logs - wider).sum(1)) / (1 + np.exp(-rows.opacities.astype(np.float64)))
         changed = np.where(squares[:, 0] == 0, rows.opacities, logit(opacities))
-    return Rows(rows.means, rows.quats, wider.astype(np.float32), changed.astype(np.float32), rows.sh)
+    return replace(rows, scales=wider.astype(np.float32), opacities=changed.astype(np.float32))

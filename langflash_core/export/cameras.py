@@ -25,6 +25,7 @@ from langflash_core.base.limits import VIEWS
 from langflash_core.base.picture_files import STORED, opened_picture, stored_shape
 from langflash_core.errors import OutputError, SceneFileError
 from langflash_core.export.colmap import check_pinhole, pinhole, read_model, text_lines
+from langflash_core.export.packing import error_line
 from langflash_core.export.settings import POINT_CLOUD
 from langflash_core.geometry.cameras import MIRRORED, invert_rigid, turned_camera
 from langflash_core.geometry.harmonics import SH_C0
@@ -155,20 +156,15 @@ def write_colmap(scene: Scene, path: Path) -> None:
         OutputError: the scene has no photos, or the folder cannot be written.
     """
     names, sizes = _write_photos(scene, path)
-    lenses, places = (
-        ["# CAMERA_ID, MODEL, WIDTH, HEIGHT, fx, fy, cx, cy"],
-        ["# IMAGE_ID, qvec, tvec, CAMERA_ID, NAME"],
-    )
+    lenses = ["# CAMERA_ID, MODEL, WIDTH, HEIGHT, fx, fy, cx, cy"]
+    places = ["# IMAGE_ID, qvec, tvec, CAMERA_ID, NAME"]
     for view, (name, (width, height)) in enumerate(zip(names, sizes, strict=True)):
         K = scene.camera(view, width, height).K.double()
         numbers = (K[0, 0], K[1, 1], K[0, 2], K[1, 2])
         lenses.append(f"{view + 1} PINHOLE {width} {height} {_format_numbers(numbers)}")
         viewmat = scene.viewmats[view].double().cpu()
-        quat = matrices_to_quats(viewmat[:3, :3])
-        places += [
-            f"{view + 1} {_format_numbers(quat)} {_format_numbers(viewmat[:3, 3])} {view + 1} {name}",
-            "",
-        ]
+        pose = f"{_format_numbers(matrices_to_quats(viewmat[:3, :3]))} {_format_numbers(viewmat[:3, 3])}"
+        places += [f"{view + 1} {pose} {view + 1} {name}", ""]
     for name, lines in (
         ("points3D.txt", ["# POINT3D_ID, X, Y, Z, R, G, B, ERROR, TRACK[]", *_points(scene)]),
         ("images.txt", places),
@@ -222,7 +218,7 @@ def read_posed(path: Path) -> PosedPhotos:
     except OSError as error:
         raise SceneFileError(f"{path} cannot be read ({error.strerror}); check its permissions") from error
     except _DAMAGE as error:
-        said = " ".join(str(error).split())[:100]
+        said = error_line(error)
         raise SceneFileError(f"{path.name} does not hold posed photos ({said}); {_REMEDY}") from error
 
 
@@ -234,20 +230,14 @@ def _write_photos(scene: Scene, path: Path) -> tuple[list[str], list[tuple[int, 
     names, sizes = [], []
     for number, photo in enumerate(scene.photos, start=1):
         names.append(f"{number:03d}.jpg")
-        sizes.append(_picture_size(photo, path))
+        try:
+            with opened_picture(photo, STORED) as picture:
+                sizes.append(picture.size)
+        except (OSError, SyntaxError, ValueError) as error:
+            why = f"a photo in the scene is damaged ({error_line(error)}); reconstruct it from photos"
+            raise OutputError(f"cannot write {path.name}: {why}") from error
         write_atomically(path.parent / _IMAGES / names[-1], photo)
     return names, sizes
-
-
-def _picture_size(photo: bytes, path: Path) -> tuple[int, int]:
-    try:
-        with opened_picture(photo, STORED) as picture:
-            return picture.size
-    except (OSError, SyntaxError, ValueError) as error:
-        said = " ".join(str(error).split())[:100]
-        raise OutputError(
-            f"cannot write {path.name}: a photo in the scene is damaged ({said}); reconstruct it from photos"
-        ) from error
 
 
 def _points(scene: Scene) -> list[str]:
@@ -288,7 +278,7 @@ def _told_path(photo: Path) -> str:
 
 
 def _colmap(path: Path) -> PosedPhotos:
-    """Raises OSError: a file is missing. SceneFileError: too much. Any of `_DAMAGE`: it holds something else."""
+    """Raises OSError: a file is missing. SceneFileError: too much. `_DAMAGE`: it holds something else."""
     seen = read_model(path)
     names = [_portable(each.name) for each in seen]
     places = [place / _IMAGES for place in (path.parent, *list(path.parent.parents)[:2])] + [path.parent]
@@ -313,19 +303,14 @@ def _transforms(path: Path) -> PosedPhotos:
         _check_lens(own, name)
         pose = torch.tensor(frame["transform_matrix"], dtype=torch.float64).reshape(-1, 4)[:3]
         pose = torch.cat((pose, torch.tensor([[0.0, 0, 0, 1]], dtype=torch.float64)))
-        paths.append(_frame_file(path.parent, _portable(name)))
-        size = _size(own, paths[-1])
-        focal = (
-            float(own["fl_x"]) if "fl_x" in own else size[0] / 2 / math.tan(float(own["camera_angle_x"]) / 2)
-        )
-        Ks.append(
-            pinhole(
-                focal,
-                float(own.get("fl_y", focal)),
-                float(own.get("cx", size[0] / 2)),
-                float(own.get("cy", size[1] / 2)),
-            )
-        )
+        file = path.parent / _portable(name)
+        paths.append(file if file.suffix else file.with_suffix(".png"))  # synthetic data sets leave it out
+        size = (int(own["w"]), int(own["h"])) if "w" in own and "h" in own else _shape(paths[-1])[0]
+        if "fl_x" not in own:
+            own["fl_x"] = size[0] / 2 / math.tan(float(own["camera_angle_x"]) / 2)
+        focal = float(own["fl_x"])
+        usual = {"fl_y": focal, "cx": size[0] / 2, "cy": size[1] / 2}
+        Ks.append(pinhole(focal, *(float(own.get(key, value)) for key, value in usual.items())))
         viewmats.append(invert_rigid(pose @ _FLIP))
         sizes.append(size)
     folder = _photo_folder(path.parent, paths)
@@ -349,18 +334,6 @@ def _photo_folder(folder: Path, paths: list[Path]) -> Path:
         return Path(os.path.commonpath([str(path.parent) for path in paths]))
     firsts = {parts[0] for parts in inside}
     return folder / firsts.pop() if len(firsts) == 1 and min(map(len, inside)) > 1 else folder
-
-
-def _frame_file(folder: Path, name: str) -> Path:
-    """The file of a frame; synthetic data sets leave the suffix out."""
-    file = folder / name
-    return file if file.suffix else file.with_suffix(".png")
-
-
-def _size(own: dict, file: Path) -> tuple[int, int]:
-    if "w" in own and "h" in own:
-        return int(own["w"]), int(own["h"])
-    return _shape(file)[0]
 
 
 def _check(posed: PosedPhotos) -> None:

@@ -39,6 +39,7 @@ _NUMBERED = (
 )  # fmt: skip
 """Names of the models, and how many numbers they have, by their number in binary files."""
 _COUNTS = dict(_NUMBERED)
+_WORDS = 9  # of a line of images.txt before the name
 
 
 @dataclass(frozen=True)
@@ -114,10 +115,10 @@ def _split_line(line: str, count: int) -> list[str]:
     Args:
         count: of words that are expected; a name behind them keeps its commas and blanks.
     """
-    words = line.split(maxsplit=count if count == COLMAP_TEXT.words else -1)
+    words = line.split(maxsplit=count if count == _WORDS else -1)
     if len(words) >= count:
         return [*(word.rstrip(",").replace(",", ".") for word in words[:count]), *words[count:]]
-    return re.split(r"\s*,\s*|\s+", line.strip(), maxsplit=count if count == COLMAP_TEXT.words else 0)
+    return re.split(r"\s*,\s*|\s+", line.strip(), maxsplit=count if count == _WORDS else 0)
 
 
 def _lens(number: str, model: str, size: list[str] | list[int], params: list[str] | list[float]) -> Lens:
@@ -139,9 +140,9 @@ def _photos(lines: list[str], lenses: dict[str, Lens]) -> Iterator[Seen]:
         if after_photo and _is_points(line, lenses):
             after_photo = False
             continue
-        words = _split_line(line, COLMAP_TEXT.words)
-        if len(words) != COLMAP_TEXT.words + 1:
-            raise ValueError(f"a line of images.txt has {len(words)} words, not {COLMAP_TEXT.words + 1}")
+        words = _split_line(line, _WORDS)
+        if len(words) != _WORDS + 1:
+            raise ValueError(f"a line of images.txt has {len(words)} words, not {_WORDS + 1}")
         numbers = [float(word) for word in words[1:8]]
         yield Seen(words[9].strip(), _viewmat(numbers), lenses[words[8]])
         after_photo = True
@@ -150,12 +151,11 @@ def _photos(lines: list[str], lenses: dict[str, Lens]) -> Iterator[Seen]:
 def _is_points(line: str, lenses: dict[str, Lens]) -> bool:
     """Whether a line behind one of a photo is its points: numbers alone, and not those of a photo whose name
     is a number. Of long lines the beginning and the end are looked at."""
-    words = _split_line(line, COLMAP_TEXT.words)
-    behind = [*words[COLMAP_TEXT.words :], ""][0]
+    words = _split_line(line, _WORDS)
+    behind = [*words[_WORDS:], ""][0]
     try:
         numbers = [
-            float(word)
-            for word in (*words[: COLMAP_TEXT.words], *behind[:40].split()[:1], *behind[-40:].split()[-1:])
+            float(word) for word in (*words[:_WORDS], *behind[:40].split()[:1], *behind[-40:].split()[-1:])
         ]
     except ValueError:
         return False

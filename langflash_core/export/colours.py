@@ -5,7 +5,7 @@ say so, are linear.
 """
 
 import colorsys
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 import torch
@@ -69,7 +69,7 @@ def with_srgb_colours(rows: Rows) -> Rows:
     slope = np.where(low, 12.92, 1.055 / 2.4 * power ** (1 / 2.4 - 1))
     sh = rows.sh * slope
     sh[:, :1] = (np.where(low, 12.92 * base, 1.055 * power ** (1 / 2.4) - 0.055) - 0.5) / SH_C0
-    return Rows(rows.means, rows.quats, rows.scales, rows.opacities, sh.astype(np.float32))
+    return replace(rows, sh=sh.astype(np.float32))
 
 
 def label_colours(count: int) -> np.ndarray:

@@ -34,9 +34,12 @@ _BOUNDS = tuple(
 )
 _WORDS = ("packed_position", "packed_rotation", "packed_scale", "packed_color")
 _ELEMENTS = ("chunk", "vertex", "sh")
+_CHUNK = 256  # Gaussians
+_SH_SPAN = 8.0  # width of the range of harmonics
 _DEGREES = {0: 0, 9: 1, 24: 2, 45: 3}  # by how many f_rest there are
 _MARK = re.compile(rb"\nproperty\s+\S+\s+packed_position(?!\S)")
 _REMEDY = "save it again, or name an uncompressed .ply"
+_Place = tuple[int, int, np.dtype]  # of an element: its first byte, its rows, their type
 
 
 def is_compressed(path: Path) -> bool:
@@ -53,7 +56,7 @@ def read_compressed_ply(path: Path) -> Scene:
     """
     with path.open("rb") as stream:
         order, elements, start, _ = read_elements(stream, path.name)
-        places: dict[str, tuple[int, int, np.dtype]] = {}
+        places: dict[str, _Place] = {}
         for name, count, fields in elements:
             size = bytes_of(count, fields, order)
             if size is None or len({field for _, field in fields}) < len(fields):
@@ -62,15 +65,16 @@ def read_compressed_ply(path: Path) -> Scene:
                 row = np.dtype([(field, order + kind) for kind, field in fields])
                 places[name] = (start, count, row)
             start += size
-        if path.stat().st_size < start or not only_blanks(path, start):
-            state = "cut off" if path.stat().st_size < start else "damaged"
+        found = path.stat().st_size
+        if found < start or not only_blanks(path, start):
+            state = "cut off" if found < start else "damaged"
             raise SceneFileError(
-                f"{path.name} is {state}: it needs {start:,} bytes, found {path.stat().st_size:,}; {_REMEDY}"
+                f"{path.name} is {state}: it needs {start:,} bytes, found {found:,}; {_REMEDY}"
             )
         num_rest = _check_elements(places, path.name)
         count = places["vertex"][1]
         gathering = Gathering(count, 1 + num_rest // 3, path.name)
-        for first in range(0, count, CHUNKS.at_once * CHUNKS.size):
+        for first in range(0, count, CHUNKS.at_once * _CHUNK):
             gathering.add(_rows(stream, places, first, num_rest))
     return to_scene(gathering, path.name, [], logs=True, logits=False, model=ply_model(path))
 
@@ -85,7 +89,7 @@ def write_compressed_ply(scene: Scene, path: Path) -> None:
     write_atomically(path, _encode(scene.gaussians, ply_comments(scene)))
 
 
-def _check_elements(places: dict[str, tuple[int, int, np.dtype]], name: str) -> int:
+def _check_elements(places: dict[str, _Place], name: str) -> int:
     """How many f_rest there are."""
     empty = (0, 0, np.dtype([]))
     (_, chunks, bounds), (_, count, words) = places.get("chunk", empty), places.get("vertex", empty)
@@ -106,12 +110,12 @@ def _check_elements(places: dict[str, tuple[int, int, np.dtype]], name: str) -> 
     names_hold = all(f"f_rest_{index}" in (rest.names or ()) for index in range(num_rest))
     if num_rest not in _DEGREES or not names_hold or (num_rest and rest_count != count):
         raise SceneFileError(f"{name} has harmonics that do not fit its Gaussians; {_REMEDY}")
-    if chunks != -(-count // CHUNKS.size):
+    if chunks != -(-count // _CHUNK):
         raise SceneFileError(f"{name} has {chunks:,} chunks for {count:,} Gaussians; {_REMEDY}")
     return num_rest
 
 
-def _rows(stream, places: dict[str, tuple[int, int, np.dtype]], first: int, num_rest: int) -> Rows:
+def _rows(stream, places: dict[str, _Place], first: int, num_rest: int) -> Rows:
     """`CHUNKS.at_once` chunks of Gaussians: log scales, opacities in [0, 1]."""
 
     def some(name: str, skip: int, most: int) -> np.ndarray:
@@ -119,9 +123,9 @@ def _rows(stream, places: dict[str, tuple[int, int, np.dtype]], first: int, num_
         stream.seek(start + skip * row.itemsize)
         return np.fromfile(stream, row, min(most, count - skip))
 
-    words = some("vertex", first, CHUNKS.at_once * CHUNKS.size)
-    chunks = some("chunk", first // CHUNKS.size, CHUNKS.at_once)
-    own = np.arange(len(words)) // CHUNKS.size
+    words = some("vertex", first, CHUNKS.at_once * _CHUNK)
+    chunks = some("chunk", first // _CHUNK, CHUNKS.at_once)
+    own = np.arange(len(words)) // _CHUNK
 
     def between(names: tuple[str, ...], shares: np.ndarray) -> np.ndarray:
         low, high = (np.stack([chunks[name] for name in part], 1)[own] for part in (names[:3], names[3:]))
@@ -133,10 +137,10 @@ def _rows(stream, places: dict[str, tuple[int, int, np.dtype]], first: int, num_
     sh = np.empty((len(words), 1 + num_rest // 3, 3), np.float32)
     sh[:, 0] = ((between(_BOUNDS[12:], colours[:, :3]) if coloured else colours[:, :3]) - 0.5) / SH_C0
     if num_rest:
-        stored = some("sh", first, CHUNKS.at_once * CHUNKS.size)
+        stored = some("sh", first, CHUNKS.at_once * _CHUNK)
         rest = np.stack([stored[f"f_rest_{index}"] for index in range(num_rest)], 1).astype(np.float32)
         centred = np.where(rest == 0, 0, np.where(rest == 255, 1, (rest + 0.5) / 256)) - 0.5
-        sh[:, 1:] = (centred * CHUNKS.sh_span).reshape(len(words), 3, -1).transpose(0, 2, 1)
+        sh[:, 1:] = (centred * _SH_SPAN).reshape(len(words), 3, -1).transpose(0, 2, 1)
     return Rows(
         between(_BOUNDS[:6], _fields(words["packed_position"], (21, 11, 0), (11, 10, 11))),
         from_smallest_three(words["packed_rotation"] >> 30, (quats - 0.5) * np.sqrt(2)),
@@ -158,13 +162,12 @@ def _encode(gaussians: Gaussians, comments: list[str]) -> Iterator[bytes]:
     order = morton_order(gaussians.means.detach().cpu().double().numpy())
     bounds, words, rest = [], [], []
     for part in parts(gaussians.map(lambda values: values.detach().cpu()[order])):
-        for first in range(0, len(part.means), CHUNKS.size):
-            chunk = Rows(*(values[first : first + CHUNKS.size] for values in part.all()))
-            low_high, packed = _pack_chunk(chunk)
+        for first in range(0, len(part.means), _CHUNK):
+            low_high, packed = _pack_chunk(part.some(slice(first, first + _CHUNK)))
             bounds.append(low_high)
             words.append(packed)
         flat = part.sh[:, 1:num_bases].transpose(0, 2, 1).reshape(len(part.means), num_rest)
-        rest.append(np.clip(np.trunc((flat / CHUNKS.sh_span + 0.5) * 256), 0, 255).astype(np.uint8).tobytes())
+        rest.append(np.clip(np.trunc((flat / _SH_SPAN + 0.5) * 256), 0, 255).astype(np.uint8).tobytes())
     lines = ["ply", "format binary_little_endian 1.0", "comment LangFlash", *comments]
     lines += [f"element chunk {len(bounds)}"]
     lines += [f"property float {name}" for name in _BOUNDS]
@@ -178,9 +181,8 @@ def _encode(gaussians: Gaussians, comments: list[str]) -> Iterator[bytes]:
 def _pack_chunk(rows: Rows) -> tuple[bytes, bytes]:
     """Bounds and words of one chunk."""
     scales = np.clip(np.log(rows.scales), -CHUNKS.widest, CHUNKS.widest)
-    means, scales, colours = rows.means, scales, 0.5 + SH_C0 * rows.sh[:, 0]
     low_high, shares = [], []
-    for values in (means, scales, colours):
+    for values in (rows.means, scales, 0.5 + SH_C0 * rows.sh[:, 0]):
         low, high = values.min(0).astype("<f4"), values.max(0).astype("<f4")
         low_high += [low, high]
         shares.append((values - low) / np.where(high > low, high - low, 1))

@@ -20,6 +20,8 @@ from langflash_core.base.optional import optional_packages
 from langflash_core.export.settings import DEPTH_FILE
 from langflash_core.types import Frame
 
+LARGEST = 2**16 - 1  # of a pixel of 16 bits
+
 
 def lengths(frame: Frame, metric_scale: float | None) -> Float[np.ndarray, "H W"]:
     """Depths of a view in metres or scene units, 0 where less than half of a pixel is covered."""
@@ -36,7 +38,7 @@ def fitting_step(longest: float) -> float:
     """The smallest of 1, 2 and 5 times a power of ten, so that `longest` fits into 16 bits."""
     if not longest > 0:
         return 1e-4
-    exact = longest / DEPTH_FILE.largest
+    exact = longest / LARGEST
     power = math.floor(math.log10(exact))
     steps = [float(f"{first}e{power + more}") for more in (0, 1) for first in (1, 2, 5)]
     return next(step for step in steps if step >= exact)
@@ -48,7 +50,7 @@ def write_depth_png(path: Path, depths: Float[np.ndarray, "H W"], step: float, u
     Raises:
         OutputError: the path cannot be written.
     """
-    counts = np.where(depths > 0, np.clip(np.rint(depths / step), 1, DEPTH_FILE.largest), 0).astype(np.uint16)
+    counts = np.where(depths > 0, np.clip(np.rint(depths / step), 1, LARGEST), 0).astype(np.uint16)
     said = PngInfo()
     said.add_text("step", f"{step:g}")
     said.add_text("unit", unit)

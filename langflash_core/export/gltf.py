@@ -24,10 +24,10 @@ import numpy as np
 from langflash_core.base.files import write_atomically
 from langflash_core.errors import SceneFileError
 from langflash_core.export.colours import encoding_of, linear, with_srgb_colours
-from langflash_core.export.gltf_document import REMEDY, TYPES, WIDTHS, Document, extensions, glb_head
+from langflash_core.export.gltf_document import COMPONENTS, REMEDY, WIDTHS, Document, extensions, glb_head
 from langflash_core.export.language import packed_language, speaks, with_language
 from langflash_core.export.packing import check_some, error_line, place_rows, transform_rows
-from langflash_core.export.settings import GLTF_CODES, STORED
+from langflash_core.export.settings import STORED
 from langflash_core.export.stored import Gathering, Rows, parts, to_scene
 from langflash_core.geometry.harmonics import MAX_SHOWN_DEGREE, SH_C0
 from langflash_core.geometry.turning import axes_matrix
@@ -36,7 +36,7 @@ from langflash_core.types import Gaussians, Scene
 EXTENSION, LANGUAGE = "KHR_gaussian_splatting", "LANGFLASH_language"
 _KNOWN = (EXTENSION, LANGUAGE, "KHR_mesh_quantization", "KHR_node_visibility")  # of what a file may require
 _AXES = "LUF"
-_POINTS = 0
+_POINTS, _ATTRIBUTES = 0, 34962  # a mode of primitives, a target of buffer views
 _SPACE, _KERNEL, _PROJECTION = "srgb_rec709_display", "ellipse", "perspective"
 _NAMES = {part: f"{EXTENSION}:{part}" for part in ("ROTATION", "SCALE", "OPACITY")}
 _DAMAGE = (ValueError, LookupError, TypeError, AttributeError, RecursionError, ArithmeticError, struct.error,
@@ -223,11 +223,10 @@ def _encode(gaussians: Gaussians, block: bytes) -> Iterator[bytes]:
     num_bases = min(gaussians.sh.shape[1], (MAX_SHOWN_DEGREE + 1) ** 2)
     matrix = axes_matrix(_AXES)
     rows = [transform_rows(part, matrix) for part in parts(gaussians)]
-    columns: list[tuple[str, str, int]] = [
-        ("POSITION", "VEC3", GLTF_CODES.float), ("COLOR_0", "VEC4", GLTF_CODES.ushort),
-        (_NAMES["ROTATION"], "VEC4", GLTF_CODES.float),
-        (_NAMES["SCALE"], "VEC3", GLTF_CODES.float), (_NAMES["OPACITY"], "SCALAR", GLTF_CODES.float),
-        *((name, "VEC3", GLTF_CODES.float) for name in _harmonics(num_bases)),
+    columns: list[tuple[str, str, str]] = [
+        ("POSITION", "VEC3", "<f4"), ("COLOR_0", "VEC4", "<u2"), (_NAMES["ROTATION"], "VEC4", "<f4"),
+        (_NAMES["SCALE"], "VEC3", "<f4"), (_NAMES["OPACITY"], "SCALAR", "<f4"),
+        *((name, "VEC3", "<f4") for name in _harmonics(num_bases)),
     ]  # fmt: skip
     document, length = _describe_document(columns, rows, len(gaussians), len(block))
     padding = b"\0" * (-length % 4)
@@ -238,13 +237,13 @@ def _encode(gaussians: Gaussians, block: bytes) -> Iterator[bytes]:
 
 
 def _describe_document(
-    columns: list[tuple[str, str, int]], rows: list[Rows], count: int, block: int
+    columns: list[tuple[str, str, str]], rows: list[Rows], count: int, block: int
 ) -> tuple[dict, int]:
     """The JSON, and the bytes of its buffer."""
     views, accessors, start = [], [], 0
-    for index, (_, kind, component) in enumerate(columns):
-        size = count * WIDTHS[kind] * np.dtype(TYPES[component]).itemsize
-        views.append({"buffer": 0, "byteOffset": start, "byteLength": size, "target": GLTF_CODES.array})
+    for index, (_, kind, number) in enumerate(columns):
+        size, component = count * WIDTHS[kind] * np.dtype(number).itemsize, COMPONENTS[number]
+        views.append({"buffer": 0, "byteOffset": start, "byteLength": size, "target": _ATTRIBUTES})
         accessors.append({"bufferView": index, "componentType": component, "count": count, "type": kind})
         start += size
     accessors[0]["min"] = np.min([part.means.min(0) for part in rows], 0).tolist()

@@ -20,17 +20,11 @@ import torch
 
 from langflash_core.base.limits import HEADER
 from langflash_core.errors import SceneFileError
-from langflash_core.export.settings import GLTF_CODES
 from langflash_core.geometry.quaternions import quats_to_matrices
 
-TYPES = {
-    5120: "i1",
-    5121: "u1",
-    5122: "<i2",
-    GLTF_CODES.ushort: "<u2",
-    GLTF_CODES.uint: "<u4",
-    GLTF_CODES.float: "<f4",
-}
+TYPES = {5120: "i1", 5121: "u1", 5122: "<i2", 5123: "<u2", 5125: "<u4", 5126: "<f4"}
+COMPONENTS = {kind: number for number, kind in TYPES.items()}
+_JSON, _BIN = 0x4E4F534A, 0x004E4942  # chunks of a .glb
 WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}
 REMEDY = "export it again, or name a .ply"
 _MULTIPLYING, _HIDING = "EXT_mesh_gpu_instancing", "KHR_node_visibility"  # what nodes may say
@@ -41,8 +35,8 @@ def glb_head(document: dict[str, Any], length: int) -> bytes:
     """What a .glb begins with, up to the first byte of its buffer of `length`, a multiple of four, bytes."""
     text = json.dumps(document).encode()
     text += b" " * (-len(text) % 4)
-    head = struct.pack("<4sIIII", b"glTF", 2, 12 + 8 + len(text) + 8 + length, len(text), GLTF_CODES.json)
-    return head + text + struct.pack("<II", length, GLTF_CODES.bin)
+    head = struct.pack("<4sIIII", b"glTF", 2, 12 + 8 + len(text) + 8 + length, len(text), _JSON)
+    return head + text + struct.pack("<II", length, _BIN)
 
 
 class Document:
@@ -55,12 +49,7 @@ class Document:
             SceneFileError: it requires another, or is of another version. ValueError: it is damaged.
         """
         self._folder, self._name, self._own = path.parent, path.name, None
-        text: bytes | memoryview = content
-        if content[:4] == b"glTF":
-            version, length = struct.unpack_from("<II", content, 4)
-            if version != 2 or length != len(content):
-                raise ValueError(f"version {version} of {length:,} bytes, found {len(content):,}")
-            text = self._chunks(content)
+        text = self._chunks(content) if content[:4] == b"glTF" else content
         HEADER.check(len(text), path.name, SceneFileError)
         self.json = json.loads(bytes(text))
         self._buffers: dict[int, memoryview] = {}
@@ -68,15 +57,18 @@ class Document:
 
     def _chunks(self, content: bytes) -> memoryview:
         """The JSON chunk; the binary one is kept."""
+        version, length = struct.unpack_from("<II", content, 4)
+        if version != 2 or length != len(content):
+            raise ValueError(f"version {version} of {length:,} bytes, found {len(content):,}")
         view, start, text = memoryview(content), 12, None
         while start + 8 <= len(content):
             size, kind = struct.unpack_from("<II", content, start)
             chunk = view[start + 8 : start + 8 + size]
             if len(chunk) < size:
                 raise ValueError(f"a chunk says {size:,} bytes, found {len(chunk):,}")
-            if kind == GLTF_CODES.json and text is None:
+            if kind == _JSON and text is None:
                 text = chunk
-            elif kind == GLTF_CODES.bin and self._own is None:
+            elif kind == _BIN and self._own is None:
                 self._own = chunk
             start += 8 + size
         if text is None:

@@ -15,13 +15,16 @@ from pathlib import Path
 import numpy as np
 
 from langflash_core.errors import SceneFileError
-from langflash_core.export.settings import BUCKETS, STORED
+from langflash_core.export.settings import STORED
 from langflash_core.export.stored import Gathering, Rows, to_scene
 from langflash_core.geometry.harmonics import SH_C0
 from langflash_core.types import Scene
 
 _MAIN = struct.Struct("<BBxxII4xIH14xff")  # version, sections room and used, count, level, range of SH
 _PART = struct.Struct("<IIIIfHxxI4xIIH")
+_HEADER, _SECTION_HEADER = 4096, 1024  # bytes
+_SH_RANGE = 1.5  # of 8-bit harmonics, where the header says 0
+_STEPS = (1, 32767, 32767)  # of half a bucket, by the level of compression, where the section says 0
 _REMEDY = "export it again, or name a .ply"
 
 
@@ -55,7 +58,7 @@ def read_ksplat(path: Path) -> Scene:
     size = path.stat().st_size
     if not size:
         raise SceneFileError(f"{path.name} is an empty file; {_REMEDY}")
-    if size < BUCKETS.header:
+    if size < _HEADER:
         raise SceneFileError(f"{path.name} is cut off or no .ksplat file; {_REMEDY}")
     with path.open("rb") as stream:
         major, minor, room, used, count, level, *limits = _MAIN.unpack(stream.read(_MAIN.size))
@@ -63,13 +66,13 @@ def read_ksplat(path: Path) -> Scene:
             found = f"version {major}.{minor}, compressed {level}"
             read = "this program reads version 0.1, compressed 0 to 2"
             raise SceneFileError(f"{path.name} is no .ksplat, or one of {found}, {read}; {_REMEDY}")
-        if BUCKETS.header + room * BUCKETS.section > size:
+        if _HEADER + room * _SECTION_HEADER > size:
             raise SceneFileError(f"{path.name} is cut off: {room:,} sections have no room in it; {_REMEDY}")
-        stream.seek(BUCKETS.header)
-        sections = _sections(stream.read(room * BUCKETS.section), room, level, size, path.name)
+        stream.seek(_HEADER)
+        sections = _sections(stream.read(room * _SECTION_HEADER), room, level, size, path.name)
         if not count or count != sum(section.count for section in sections):
             raise SceneFileError(f"{path.name} holds no Gaussians, or not as many as it says; {_REMEDY}")
-        low, high = limits[0] or -BUCKETS.sh_range, limits[1] or BUCKETS.sh_range
+        low, high = limits[0] or -_SH_RANGE, limits[1] or _SH_RANGE
         num_bases = (max(section.degree for section in sections) + 1) ** 2
         gathering = Gathering(count, num_bases, path.name)
         for section in sections:
@@ -80,16 +83,16 @@ def read_ksplat(path: Path) -> Scene:
 
 def _sections(headers: bytes, room: int, level: int, size: int, name: str) -> list[_Section]:
     """Raises SceneFileError: one does not fit into the file."""
-    sections, start = [], BUCKETS.header + room * BUCKETS.section
+    sections, start = [], _HEADER + room * _SECTION_HEADER
     for index in range(room):
-        if not any(headers[index * BUCKETS.section : (index + 1) * BUCKETS.section]):
+        if not any(headers[index * _SECTION_HEADER : (index + 1) * _SECTION_HEADER]):
             continue  # room that was not needed
-        values = _PART.unpack_from(headers, index * BUCKETS.section)
+        values = _PART.unpack_from(headers, index * _SECTION_HEADER)
         count, most, capacity, buckets, side, bucket_bytes, steps, full, partial, degree = values
+        steps = steps or _STEPS[level]
         section = _Section(
-            count, most, capacity, buckets, side, bucket_bytes,
-            steps or BUCKETS.steps[level], full, partial, degree, start,
-        )  # fmt: skip
+            count, most, capacity, buckets, side, bucket_bytes, steps, full, partial, degree, start
+        )
         if degree > 3:
             raise SceneFileError(
                 f"{name} has harmonics of degree {degree}, this program reads 0 to 3; {_REMEDY}"

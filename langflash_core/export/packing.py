@@ -5,6 +5,7 @@ which entry that is takes two bits. The entries lie within 1/sqrt(2).
 """
 
 import zlib
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -25,7 +26,7 @@ def transform_rows(rows: Rows, matrix: torch.Tensor) -> Rows:
     means, quats, sh = (torch.tensor(values) for values in (rows.means, rows.quats, rows.sh))
     moved = (means.double() @ matrix.double().T).float()
     quats, sh = turned_quats(quats, matrix), turned_sh(sh, matrix)
-    return Rows(moved.numpy(), quats.numpy(), rows.scales, rows.opacities, sh.numpy())
+    return replace(rows, means=moved.numpy(), quats=quats.numpy(), sh=sh.numpy())
 
 
 @np.errstate(over="ignore", invalid="ignore")  # rows that are not finite stay out
@@ -46,10 +47,9 @@ def place_rows(rows: Rows, place: np.ndarray, axes: str) -> Rows:
     if not size > 0 or np.abs(linear.T @ linear / size**2 - np.eye(3)).max() > PACKING.even:
         raise ValueError("a node stretches its Gaussians unevenly")
     means, scales = ((values * size).astype(np.float32) for values in (rows.means, rows.scales))
-    sized = Rows(means, rows.quats, scales, rows.opacities, rows.sh)
+    sized = replace(rows, means=means, scales=scales)
     moved = transform_rows(sized, ours @ torch.from_numpy(linear / size))
-    shift = (ours.numpy() @ place[:3, 3]).astype(np.float32)
-    return Rows(moved.means + shift, moved.quats, moved.scales, moved.opacities, moved.sh)
+    return replace(moved, means=moved.means + (ours.numpy() @ place[:3, 3]).astype(np.float32))
 
 
 def smallest_three(quats: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

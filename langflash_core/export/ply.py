@@ -80,7 +80,7 @@ def read_ply(path: Path) -> Scene:
     with path.open("rb") as stream:
         layout = _read_layout(stream, path.name)
         _check_size(path, layout)
-        num_bases = 1 + layout.num_rest // 3
+        num_bases, filtered = 1 + layout.num_rest // 3, filter_of(layout.row.names)
         gathering = Gathering(layout.count, num_bases, path.name)
         stream.seek(0)
         head = stream.read(layout.start)
@@ -89,8 +89,9 @@ def read_ply(path: Path) -> Scene:
         stream.seek(layout.start)
         for first in range(0, layout.count, STORED.rows_at_once):
             rows = np.fromfile(stream, numbers.row, min(STORED.rows_at_once, layout.count - first))
-            gathering.add(_filter_rows(_columns(rows, num_bases, numbers), rows))
-    model = ANTIALIASED if filter_of(layout.row.names) else ply_model(path)
+            stored = _columns(rows, num_bases, numbers)
+            gathering.add(stored if filtered is None else apply_filter(stored, rows[filtered]))
+    model = ANTIALIASED if filtered else ply_model(path)
     scene = _activate_rows(gathering, numbers, path.name, layout, model)
     beside = side_car(path)
     return with_language(scene, beside.read_bytes(), beside.name) if beside.is_file() else scene
@@ -100,7 +101,12 @@ def _activate_rows(gathering: Gathering, numbers: Numbers, name: str, layout: _L
     """The scene of gathered rows. model: as `to_scene` takes it."""
     stored, warnings = gathering.stored(), list(numbers.said)
     known = layout.own or filter_of(layout.row.names) is not None  # whose writers leave nothing to guess
-    logits = known or not _looks_activated(stored.opacities)
+    # As logits, opacities in [0, 1] alone would be 0.5 to 0.73, which no capture has.
+    logits = (
+        known
+        or not len(stored.opacities)
+        or not (float(stored.opacities.min()) >= 0 and float(stored.opacities.max()) <= 1)
+    )
     logs = known or not _looks_linear(stored)
     if not logits:
         warnings.append("All opacities lie between 0 and 1, so they are taken as they are, not as logits.")
@@ -179,11 +185,8 @@ def read_elements(stream: BinaryIO, name: str) -> tuple[str, list["_Element"], i
         raise SceneFileError(f"{name} is not a PLY file, whatever its name says; {_REMEDY}")
     ended = HEADER_END.search(head)
     if ended is None:
-        state = (
-            "cut off inside its header"
-            if len(head) < PLY_TEXT.max_header
-            else "damaged: its header does not end"
-        )
+        short = len(head) < PLY_TEXT.max_header
+        state = "cut off inside its header" if short else "damaged: its header does not end"
         raise SceneFileError(f"{name} is {state}; {_REMEDY}")
     lines = [line.split() for line in head[: ended.start()].decode("latin-1").splitlines()]
     return *_elements(lines, name), ended.end(), _OWN.encode() in head[: ended.start()]
@@ -272,16 +275,6 @@ def _columns(rows: np.ndarray, num_bases: int, numbers: Numbers) -> Rows:
         sh[:, 1:] = rest.reshape(-1, 3, num_bases - 1).transpose(0, 2, 1)
     opacities = block(rows, ("opacity",))[:, 0]
     return Rows(numbers.means(rows), block(rows, QUATS), numbers.scales(rows), opacities, sh)
-
-
-def _filter_rows(stored: Rows, rows: np.ndarray) -> Rows:
-    name = filter_of(rows.dtype.names)
-    return stored if name is None else apply_filter(stored, rows[name])
-
-
-def _looks_activated(opacities: np.ndarray) -> bool:
-    """Whether none is outside [0, 1]; as logits that would be 0.5 to 0.73, which no capture has."""
-    return bool(len(opacities)) and float(opacities.min()) >= 0 and float(opacities.max()) <= 1
 
 
 def _looks_linear(stored: Rows) -> bool:

@@ -126,20 +126,12 @@ def block(rows: np.ndarray, names: tuple[str, ...], kind: type = np.float32) -> 
 def _halves(rows: np.ndarray, name: str) -> tuple[np.dtype, tuple[str, ...]]:
     """The type of rows with ushort as halves where a Gaussian's numbers are so, and what is to be said."""
     row = rows.dtype
-    own = [
-        field
-        for field in row.names or ()
-        if field in _OWN or field.startswith("f_rest_") or filter_of((field,))
-    ]
+    names = row.names or ()
+    own = [each for each in names if each in _OWN or each.startswith("f_rest_") or filter_of((each,))]
     whole = [field for field in own if row[field].kind in "iu"]
     if not whole:
         return row, ()
-    meant = np.dtype(
-        [
-            (field, row[field].str.replace("u2", "f2") if field in whole else row[field])
-            for field in row.names or ()
-        ]
-    )
+    meant = np.dtype([(f, row[f].str.replace("u2", "f2") if f in whole else row[f]) for f in names])
     alike = all(row[field].str[1:] == "u2" for field in whole) and set(QUATS) <= set(whole)
     if not alike or not _sensible(rows.view(meant), own):
         kind = f"{whole[0]} as whole numbers ({row[whole[0]].name})"
@@ -151,9 +143,8 @@ def _sensible(rows: np.ndarray, own: list[str]) -> bool:
     """Whether nearly all rows are finite and have a quaternion of some usual length."""
     finite = np.isfinite(block(rows, tuple(own))).all(1)
     norms = np.linalg.norm(block(rows[finite], QUATS, np.float64), axis=1)
-    return float(
-        ((norms > PLY_NUMBERS.norms[0]) & (norms < PLY_NUMBERS.norms[1])).sum()
-    ) >= PLY_NUMBERS.most * len(rows)
+    usual = (norms > PLY_NUMBERS.norms[0]) & (norms < PLY_NUMBERS.norms[1])
+    return float(usual.sum()) >= PLY_NUMBERS.most * len(rows)
 
 
 def _shift(rows: np.ndarray, head: bytes) -> Shift | None:

@@ -18,6 +18,8 @@ from langflash_core.export.settings import QUANTISING
 from langflash_core.geometry.harmonics import MAX_SHOWN_DEGREE
 from langflash_core.types import Gaussians
 
+_STEPS = 65535  # of positions: two bytes
+
 
 @dataclass(frozen=True)
 class Palette:
@@ -68,7 +70,7 @@ def quantise(gaussians: Gaussians, means: Tensor | None = None) -> Quantised:
     return Quantised(
         lowest=lowest,
         highest=highest,
-        steps=np.round((logs - lowest) / span * QUANTISING.steps).astype(int),
+        steps=np.round((logs - lowest) / span * _STEPS).astype(int),
         largest=largest,
         turns=np.clip(np.round((others * math.sqrt(2) * 0.5 + 0.5) * 255), 0, 255).astype(int),
         scale_book=scale_book,

@@ -41,8 +41,6 @@ class Colmap:
 
     straight: float = 1e-3
     """Distortion up to which photos count as straight."""
-    words: int = 9
-    """Words of a line of images.txt before the name."""
     longest_name: int = 4096
     """Bytes of a photo's name."""
 
@@ -54,12 +52,8 @@ COLMAP_TEXT = Colmap()
 class Chunks:
     """SuperSplat's compressed .ply (`export.compressed_ply`)."""
 
-    size: int = 256
-    """Gaussians of a chunk."""
     at_once: int = 256
     """Chunks in work at once."""
-    sh_span: float = 8.0
-    """Width of the range of harmonics."""
     widest: float = 20.0
     """Log scales are written within this of 0."""
 
@@ -71,8 +65,6 @@ CHUNKS = Chunks()
 class DepthFile:
     """Pictures of depth (`export.depth`)."""
 
-    largest: int = 2**16 - 1
-    """Of a pixel of 16 bits."""
     covered: float = 0.5
     """Alpha from which a pixel shows the scene, as in answers."""
 
@@ -91,23 +83,6 @@ class Boxes:
 
 
 BOXES = Boxes()
-
-
-@dataclass(frozen=True)
-class Buckets:
-    """.ksplat files (`export.ksplat`)."""
-
-    header: int = 4096
-    """Bytes of a file's header."""
-    section: int = 1024
-    """Bytes of a section's header."""
-    sh_range: float = 1.5
-    """Of 8-bit harmonics, where the header says 0."""
-    steps: tuple[int, int, int] = (1, 32767, 32767)
-    """Steps of half a bucket, by the level of compression, where the section says 0."""
-
-
-BUCKETS = Buckets()
 
 
 @dataclass(frozen=True)
@@ -201,8 +176,6 @@ class Quantising:
     """Numbers of a codebook: one byte names each."""
     palette: int = 8192
     """Vectors of harmonics."""
-    steps: int = 65535
-    """Steps of positions: two bytes."""
 
 
 QUANTISING = Quantising()
@@ -229,18 +202,8 @@ SHEET = Sheet()
 class Sog:
     """.sog files (`export.sog`)."""
 
-    book: int = 256
-    """Numbers of a codebook."""
-    row: int = 64
-    """Entries a row of the palette's picture."""
-    largest_side: int = 16383
-    """Pixels of a WebP."""
-    tags: int = 252
-    """Alpha of a rotation whose largest entry is the first."""
     most_meta: int = 1 << 20
     """Bytes of meta.json."""
-    most_palette: int = 1 << 16
-    """Entries that a label can name."""
     slack: int = 1 << 16
     """Bytes and pixels that a picture may have more than it needs."""
 
@@ -265,18 +228,8 @@ SPLAT_BYTES = SplatBytes()
 class Spz:
     """.spz files (`export.spz`)."""
 
-    zstd_head: int = 32
-    """Bytes: the head, the place of the table of contents, 12 spare ones."""
-    smoothed: int = 1
-    """Flag of a scene that was antialiased."""
-    extended: int = 2
-    """Flag of a file with extensions."""
-    axes_extension: int = 0xADBE0003
-    """Number of the extension that says the axes."""
     most_extensions: int = 1 << 20
     """Bytes of versions 2 and 3, which do not say how many there are."""
-    colour_scale: float = 0.15
-    """Of harmonics of degree 0, in a byte."""
     sh_steps: tuple[int, int] = (8, 16)
     """Of 256, degree 1 and above: 5 and 4 significant bits."""
     most_bits: int = 16
@@ -303,24 +256,3 @@ class Stored:
 
 
 STORED = Stored()
-
-
-@dataclass(frozen=True)
-class Gltf:
-    """Codes of glTF and its binary form (`export.gltf_document`)."""
-
-    ushort: int = 5123
-    """Component type, unsigned 16 bits."""
-    uint: int = 5125
-    """Component type, unsigned 32 bits."""
-    float: int = 5126
-    """Component type, float32."""
-    array: int = 34962
-    """Target of a buffer view of attributes."""
-    json: int = 0x4E4F534A
-    """Type of the chunk that holds JSON."""
-    bin: int = 0x004E4942
-    """Type of the chunk that holds bytes."""
-
-
-GLTF_CODES = Gltf()

@@ -18,6 +18,7 @@ import zipfile
 import zlib
 from collections.abc import Callable
 from pathlib import Path
+from typing import IO
 
 import numpy as np
 import torch
@@ -30,7 +31,7 @@ from langflash_core.base.picture_files import opened_picture
 from langflash_core.errors import OutputError, SceneFileError
 from langflash_core.export.packing import check_some, error_line, from_smallest_three, morton_order
 from langflash_core.export.quantised import Palette, quantise
-from langflash_core.export.settings import SOG_LIMITS, STORED
+from langflash_core.export.settings import QUANTISING, SOG_LIMITS, STORED
 from langflash_core.export.stored import ANTIALIASED, PLAIN, Gathering, Rows, to_scene
 from langflash_core.types import Scene
 
@@ -39,7 +40,11 @@ _DAMAGE = (
     EOFError, zipfile.BadZipFile, zlib.error, struct.error,
 )  # fmt: skip
 _REMEDY = "export it again, or name a .ply"
-_Opener = Callable[[str, int], bytes]
+_ROW = 64  # entries a row of the palette's picture
+_LARGEST_SIDE = 16383  # pixels of a WebP
+_TAGS = 252  # alpha of a rotation whose largest entry is the first
+_MOST_PALETTE = 1 << 16  # entries that a label can name
+_Opener = Callable[[str], IO[bytes]]
 
 
 def read_sog(path: Path) -> Scene:
@@ -52,10 +57,10 @@ def read_sog(path: Path) -> Scene:
         raise SceneFileError(f"{path.name} is an empty file; {_REMEDY}")
     try:
         if path.name.lower() == SOG_FOLDER:
-            return _read_folder(path.name, lambda name, most: _file(path.parent, name, most))
+            return _read_folder(path.name, lambda name: (path.parent / name).open("rb"))
         with zipfile.ZipFile(path) as archive:
             FILES.check(len(archive.infolist()), path.name, SceneFileError)
-            return _read_folder(path.name, lambda name, most: _entry(archive, name, most))
+            return _read_folder(path.name, archive.open)
     except Image.DecompressionBombError as error:
         raise SceneFileError(f"{path.name} has a picture of too many pixels; {_REMEDY}") from error
     except _DAMAGE as error:
@@ -69,7 +74,7 @@ def write_sog(scene: Scene, path: Path) -> None:
         OutputError: there is nothing to write, too much for one picture, or an unwritable path.
     """
     check_some(scene.gaussians, path)
-    if len(scene.gaussians) > SOG_LIMITS.largest_side**2 // 2:
+    if len(scene.gaussians) > _LARGEST_SIDE**2 // 2:
         raise OutputError(f"cannot write {path.name}: too many Gaussians for a SOG; name a .ply")
     files = _encode(scene)
     if path.name.lower() == SOG_FOLDER:
@@ -91,32 +96,23 @@ def sog_files(path: Path) -> list[Path]:
     return [path, *(path.with_name(name) for part in parts for name in part.get("files", ()))]
 
 
-def _file(folder: Path, name: str, most: int) -> bytes:
-    with (folder / name).open("rb") as stream:
-        return _at_most(stream, most, name)
-
-
-def _entry(archive: zipfile.ZipFile, name: str, most: int) -> bytes:
-    with archive.open(name) as stream:
-        return _at_most(stream, most, name)
-
-
-def _at_most(stream, most: int, name: str) -> bytes:
-    content = stream.read(most + 1)
-    if len(content) > most:
-        raise ValueError(f"{name} is larger than its Gaussians need")
-    return content
-
-
 def _read_folder(name: str, open_file: _Opener) -> Scene:
     """Raises SceneFileError: another version. Any of `_DAMAGE`: something does not fit."""
-    meta = json.loads(open_file(SOG_FOLDER, SOG_LIMITS.most_meta))
+
+    def content(file: str, most: int) -> bytes:
+        with open_file(file) as stream:
+            found = stream.read(most + 1)
+        if len(found) > most:
+            raise ValueError(f"{file} is larger than its Gaussians need")
+        return found
+
+    meta = json.loads(content(SOG_FOLDER, SOG_LIMITS.most_meta))
     if meta.get("version") != 2:
         raise SceneFileError(
             f"{name} is a SOG of version {meta.get('version', 1)!r}, this program reads version 2; {_REMEDY}"
         )
     count = meta["count"]
-    if not isinstance(count, int) or not 0 < count <= SOG_LIMITS.largest_side**2:
+    if not isinstance(count, int) or not 0 < count <= _LARGEST_SIDE**2:
         raise ValueError(f"its count is {count!r}")
     GAUSSIANS.check(count, name, SceneFileError)
 
@@ -124,7 +120,7 @@ def _read_folder(name: str, open_file: _Opener) -> Scene:
         file = meta[part]["files"][index]
         if not isinstance(file, str) or Path(file).name != file:
             raise ValueError(f"it names a file {file!r}")
-        return _pixels(open_file(file, 8 * needed + SOG_LIMITS.slack), needed, file)
+        return _pixels(content(file, 8 * needed + SOG_LIMITS.slack), needed, file)
 
     books = {part: _book(meta[part]) for part in ("scales", "sh0")}
     lowest, highest = (np.array(meta["means"][end], np.float64).reshape(3) for end in ("mins", "maxs"))
@@ -161,19 +157,19 @@ def _pixels(content: bytes, needed: int, name: str) -> np.ndarray:
 def _book(part: dict) -> np.ndarray:
     """256 numbers (256,) float32; those that are missing are 0, as readers of the format take them."""
     numbers = np.array([0.0 if number is None else number for number in part["codebook"]], np.float64)
-    book = np.zeros(SOG_LIMITS.book, np.float32)
-    book[: len(numbers)] = numbers.reshape(-1)[: SOG_LIMITS.book]
+    book = np.zeros(QUANTISING.book, np.float32)
+    book[: len(numbers)] = numbers.reshape(-1)[: QUANTISING.book]
     return book
 
 
 def _harmonics(part: dict, pixels: Callable[..., np.ndarray], count: int) -> tuple[np.ndarray, np.ndarray]:
     """Coefficients (k, S - 1, 3) of the palette, and the entry (n,) of each Gaussian."""
     bands, entries = part["bands"], part["count"]
-    if bands not in (1, 2, 3) or not isinstance(entries, int) or not 0 < entries <= SOG_LIMITS.most_palette:
+    if bands not in (1, 2, 3) or not isinstance(entries, int) or not 0 < entries <= _MOST_PALETTE:
         raise ValueError(f"its palette has {entries!r} entries of degree {bands!r}")
-    bases, rows = (bands + 1) ** 2 - 1, -(-entries // SOG_LIMITS.row)
-    stored = pixels("shN", 0, rows * SOG_LIMITS.row * bases)[:, :3]
-    coefficients = _book(part)[stored].reshape(rows * SOG_LIMITS.row, bases, 3)[:entries]
+    bases, rows = (bands + 1) ** 2 - 1, -(-entries // _ROW)
+    stored = pixels("shN", 0, rows * _ROW * bases)[:, :3]
+    coefficients = _book(part)[stored].reshape(rows * _ROW, bases, 3)[:entries]
     labels = pixels("shN", 1)[:, :2].astype(np.int64)
     places = labels[:, 0] | labels[:, 1] << 8
     # Labels beyond the palette mean no gloss, as readers of the format take them.
@@ -182,7 +178,7 @@ def _harmonics(part: dict, pixels: Callable[..., np.ndarray], count: int) -> tup
 
 def _quats(stored: np.ndarray) -> np.ndarray:
     """wxyz (n, 4) of pixels (n, 4); a tag that is none means no rotation."""
-    tags = stored[:, 3].astype(np.int64) - SOG_LIMITS.tags
+    tags = stored[:, 3].astype(np.int64) - _TAGS
     others = (stored[:, :3] / 255.0 * 2 - 1) * math.sqrt(0.5)
     quats = from_smallest_three(np.clip(tags, 0, 3), others)
     quats[tags < 0] = (1, 0, 0, 0)
@@ -196,7 +192,7 @@ def _encode(scene: Scene) -> dict[str, bytes]:
     files = {
         "means_l.webp": _picture(stored.steps & 255),
         "means_u.webp": _picture(stored.steps >> 8),
-        "quats.webp": _picture(np.concatenate((stored.turns, SOG_LIMITS.tags + stored.largest[:, None]), 1)),
+        "quats.webp": _picture(np.concatenate((stored.turns, _TAGS + stored.largest[:, None]), 1)),
         "scales.webp": _picture(stored.scales),
         "sh0.webp": _picture(np.concatenate((stored.colours, stored.opacities[:, None]), 1)),
     }
@@ -223,30 +219,24 @@ def _encode(scene: Scene) -> dict[str, bytes]:
 def _encoded_harmonics(harmonics: Palette) -> tuple[dict, dict[str, bytes]]:
     """The entry of meta.json and the two pictures of a palette."""
     count, bases, _ = harmonics.places.shape
-    rows, labels = -(-count // SOG_LIMITS.row), harmonics.labels
-    stored = np.zeros((rows * SOG_LIMITS.row, bases, 3), np.int64)
+    rows, labels = -(-count // _ROW), harmonics.labels
+    stored = np.zeros((rows * _ROW, bases, 3), np.int64)
     stored[:count] = harmonics.places
     files = {
-        "shN_centroids.webp": _picture(stored.reshape(-1, 3), SOG_LIMITS.row * bases),
+        "shN_centroids.webp": _picture(stored.reshape(-1, 3), _ROW * bases),
         "shN_labels.webp": _picture(np.stack((labels & 255, labels >> 8, np.zeros_like(labels)), 1)),
     }
-    described = {
-        "count": count,
-        "bands": math.isqrt(bases + 1) - 1,
-        "codebook": harmonics.book.tolist(),
-        "files": list(files),
-    }
-    return described, files
+    own = {"count": count, "bands": math.isqrt(bases + 1) - 1}
+    return {**own, "codebook": harmonics.book.tolist(), "files": list(files)}, files
 
 
 def _picture(values: np.ndarray, width: int | None = None) -> bytes:
     """A lossless WebP of pixels (n, 3 or 4), opaque where there is no fourth value; sides divide by 4."""
     count = len(values)
+    height = count // width if width else 0
     if width is None:
         width = math.ceil(math.sqrt(count) / 4) * 4
         height = math.ceil(count / width / 4) * 4
-    else:
-        height = count // width
     pixels = np.zeros((height * width, 4), np.uint8)
     pixels[:, 3] = 255
     pixels[:count, : values.shape[1]] = values

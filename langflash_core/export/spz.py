@@ -40,6 +40,10 @@ from langflash_core.types import Gaussians, Scene
 
 _MAGIC = b"NGSP"
 _HEAD = struct.Struct("<4sIIBBBB")  # magic, version, count, degree, fractional bits, flags, streams
+_ZSTD_HEAD = 32  # bytes: the head, the place of the table of contents, 12 spare ones
+_SMOOTHED, _EXTENDED = 1, 2  # flags: the scene was antialiased; there are extensions
+_AXES_EXTENSION = 0xADBE0003
+_COLOUR_SCALE = 0.15  # of harmonics of degree 0, in a byte
 _STORED_AXES = "RUB"
 _ON_ITS_HEAD = (
     "The scene seems to stand on its head; if SuperSplat or splat-transform wrote it, read it with --axes "
@@ -82,18 +86,15 @@ def read_spz(path: Path, *, axes: str | None = None) -> Scene:
     content = path.read_bytes()
     if not content:
         raise SceneFileError(f"{path.name} is an empty file; {_REMEDY}")
-    if content[:2] == b"\x1f\x8b":
-        header, streams, extensions = _unpack_gzip(content, path.name)
-    else:
-        header, streams, extensions = _unpack_zstd(content, path.name)
+    unpack = _unpack_gzip if content[:2] == b"\x1f\x8b" else _unpack_zstd
+    header, streams, extensions = unpack(content, path.name)
     named = _named_axes(extensions, path.name)
     matrix = axes_matrix(named or axes or _STORED_AXES).T  # to ours
     gathering = Gathering(header.count, header.num_shown, path.name)
     for first in range(0, header.count, STORED.rows_at_once):
-        gathering.add(
-            transform_rows(_rows(header, streams, slice(first, first + STORED.rows_at_once)), matrix)
-        )
-    model = ANTIALIASED if header.flags & SPZ_FORMAT.smoothed else PLAIN
+        some = slice(first, first + STORED.rows_at_once)
+        gathering.add(transform_rows(_rows(header, streams, some), matrix))
+    model = ANTIALIASED if header.flags & _SMOOTHED else PLAIN
     scene = to_scene(gathering, path.name, [], logs=True, logits=False, model=model)
     return scene.with_record(warnings=(*scene.record.warnings, *_of_axes(scene.gaussians, named, axes)))
 
@@ -113,10 +114,8 @@ def write_spz(scene: Scene, path: Path, *, version: int | None = None, axes: str
     if version is None:
         version = 4 if has_zstd() else 3
     header, streams = _encode(scene.gaussians, version, path.name, axes or _STORED_AXES)
-    extensions = struct.pack("<III", SPZ_FORMAT.axes_extension, 4, AXES.index(axes) + 1) if axes else b""
-    flags = (SPZ_FORMAT.smoothed if scene.record.antialiased else 0) | (
-        SPZ_FORMAT.extended if extensions else 0
-    )
+    extensions = struct.pack("<III", _AXES_EXTENSION, 4, AXES.index(axes) + 1) if axes else b""
+    flags = _SMOOTHED * scene.record.antialiased | _EXTENDED * bool(extensions)
     fields = (header.version, header.count, header.degree, header.bits, flags)
     if version < 4:
         plain = _HEAD.pack(_MAGIC, *fields, 0) + b"".join(streams) + extensions
@@ -124,25 +123,17 @@ def write_spz(scene: Scene, path: Path, *, version: int | None = None, axes: str
     streams = [stream for stream in streams if stream]
     packed = [zstd_packed(stream) for stream in streams]
     table = b"".join(struct.pack("<QQ", len(p), len(s)) for p, s in zip(packed, streams, strict=True))
-    head = _HEAD.pack(_MAGIC, *fields, len(streams)) + struct.pack(
-        "<I12x", SPZ_FORMAT.zstd_head + len(extensions)
-    )
+    head = _HEAD.pack(_MAGIC, *fields, len(streams)) + struct.pack("<I12x", _ZSTD_HEAD + len(extensions))
     write_atomically(path, [head, extensions, table, *packed])
 
 
 def _unpack_gzip(content: bytes, name: str) -> tuple[_Header, list[bytes], bytes]:
     """Header, attribute streams and extensions of version 2 or 3."""
     head = inflate(content, _HEAD.size, name, wbits=31)
-    header = _header(head, name)
-    if header.version not in (2, 3):
-        raise SceneFileError(
-            f"{name} is a .spz of version {header.version}, this program reads 2 to 4; {_REMEDY}"
-        )
+    header = _header(head, name, (2, 3))
     needed = sum(header.sizes())
     _check_shrinking(needed, len(content), name)
-    after = (
-        SPZ_FORMAT.most_extensions if header.flags & SPZ_FORMAT.extended else 1
-    )  # asked for, so that an end that is missing shows
+    after = SPZ_FORMAT.most_extensions if header.flags & _EXTENDED else 1  # 1: so a missing end shows
     plain = inflate(content, _HEAD.size + needed + after, name, wbits=31)
     if len(plain) < _HEAD.size + needed:
         raise SceneFileError(
@@ -158,15 +149,11 @@ def _unpack_gzip(content: bytes, name: str) -> tuple[_Header, list[bytes], bytes
 
 def _unpack_zstd(content: bytes, name: str) -> tuple[_Header, list[bytes], bytes]:
     """Header, attribute streams and extensions of version 4."""
-    header = _header(content, name)
-    if header.version != 4:
-        raise SceneFileError(
-            f"{name} is a .spz of version {header.version}, this program reads 2 to 4; {_REMEDY}"
-        )
+    header = _header(content, name, (4,))
     sizes = [size for size in header.sizes() if size]
     table = int.from_bytes(content[_HEAD.size : _HEAD.size + 4], "little")
     start = table + 16 * len(sizes)
-    if header.streams != len(sizes) or table < SPZ_FORMAT.zstd_head or start > len(content):
+    if header.streams != len(sizes) or table < _ZSTD_HEAD or start > len(content):
         raise SceneFileError(f"{name} is cut off or damaged: its table of contents does not fit; {_REMEDY}")
     _check_shrinking(sum(sizes), len(content), name)
     streams = []
@@ -176,15 +163,11 @@ def _unpack_zstd(content: bytes, name: str) -> tuple[_Header, list[bytes], bytes
         streams.append(zstd_inflated(content[start : start + packed], size, name))
         start += packed
     streams += [b""] * (len(header.sizes()) - len(streams))
-    return (
-        header,
-        streams,
-        content[SPZ_FORMAT.zstd_head : table] if header.flags & SPZ_FORMAT.extended else b"",
-    )
+    return header, streams, content[_ZSTD_HEAD:table] if header.flags & _EXTENDED else b""
 
 
-def _header(head: bytes, name: str) -> _Header:
-    """Raises SceneFileError: it is no .spz header, or one of no Gaussians."""
+def _header(head: bytes, name: str, versions: tuple[int, ...]) -> _Header:
+    """Raises SceneFileError: it is no .spz header of these versions, or one of no Gaussians."""
     if len(head) < _HEAD.size or head[:4] != _MAGIC:
         raise SceneFileError(f"{name} is not a .spz file, whatever its name says; {_REMEDY}")
     header = _Header(*_HEAD.unpack(head[: _HEAD.size])[1:])
@@ -193,6 +176,10 @@ def _header(head: bytes, name: str) -> _Header:
         raise SceneFileError(f"{name} is damaged: {found}; {_REMEDY}")
     if not header.count:
         raise SceneFileError(f"{name} holds no Gaussians; {_REMEDY}")
+    if header.version not in versions:
+        raise SceneFileError(
+            f"{name} is a .spz of version {header.version}, this program reads 2 to 4; {_REMEDY}"
+        )
     return header
 
 
@@ -213,9 +200,9 @@ def _named_axes(extensions: bytes, name: str) -> str | None:
         if len(value) < size:
             raise SceneFileError(f"{name} has an extension {kind:#x} of {size:,} bytes, cut off; {_REMEDY}")
         number = int.from_bytes(value[:4], "little")
-        if kind == SPZ_FORMAT.axes_extension and (size != 4 or number > len(AXES)):
+        if kind == _AXES_EXTENSION and (size != 4 or number > len(AXES)):
             raise SceneFileError(f"{name} names axes {number}, this program knows 1 to 16; {_REMEDY}")
-        if kind == SPZ_FORMAT.axes_extension and number:  # 0: unspecified
+        if kind == _AXES_EXTENSION and number:  # 0: unspecified
             return AXES[number - 1]
         start += 8 + size
     return None
@@ -234,10 +221,10 @@ def _rows(header: _Header, streams: list[bytes], some: slice) -> Rows:
         np.frombuffer(stream, np.uint8).reshape(header.count, -1)[some] for stream in streams
     )
     sh = np.empty((len(places), header.num_shown, 3), np.float32)
-    sh[:, 0] = (colours / np.float32(255) - 0.5) / SPZ_FORMAT.colour_scale
+    sh[:, 0] = (colours / np.float32(255) - 0.5) / _COLOUR_SCALE
     sh[:, 1:] = (rest.reshape(len(places), -1, 3)[:, : header.num_shown - 1] - np.float32(128)) / 128
     return Rows(
-        _decode_fixed_point(places) / np.float32(1 << header.bits),
+        _fixed_point(places) / np.float32(1 << header.bits),
         _first_three(quats) if header.version == 2 else _signed_three(quats),
         scales / np.float32(16) - 10,
         opacities[:, 0] / np.float32(255),
@@ -245,7 +232,7 @@ def _rows(header: _Header, streams: list[bytes], some: slice) -> Rows:
     )
 
 
-def _decode_fixed_point(places: np.ndarray) -> np.ndarray:
+def _fixed_point(places: np.ndarray) -> np.ndarray:
     """Signed integers (n, 3) float32 of little-endian bytes (n, 9): exact, they have 24 bits."""
     low, middle, high = places.reshape(len(places), 3, 3).transpose(2, 0, 1).astype(np.int32)
     whole = low | middle << 8 | high << 16
@@ -276,9 +263,8 @@ def _encode(gaussians: Gaussians, version: int, name: str, axes: str) -> tuple[_
             f"cannot write {name}: a Gaussian lies {furthest:.3g} away, a .spz ends at {1 << 23:,}; "
             "remove it, or name a .ply"
         )
-    bits = next(
-        b for b in range(SPZ_FORMAT.most_bits, -1, -1) if round(furthest * (1 << b)) < 1 << 23 or not b
-    )
+    finest = range(SPZ_FORMAT.most_bits, -1, -1)
+    bits = next(b for b in finest if round(furthest * (1 << b)) < 1 << 23 or not b)
     degree = min(int(gaussians.sh.shape[1] ** 0.5) - 1, MAX_SHOWN_DEGREE)
     header = _Header(version, len(gaussians), degree, bits, 0, 0)
     matrix, columns = axes_matrix(axes), []
@@ -295,19 +281,15 @@ def _columns(rows: Rows, version: int, bits: int) -> tuple[bytes, ...]:
     steps = np.where(np.arange(sh.shape[1]) < 3, *SPZ_FORMAT.sh_steps)[:, None]
     # The lowest bits are zero for the packer's sake; 0 stays 128.
     rest = np.clip((sh + steps // 2) // steps * steps, 0, 255)
+    upright = np.where(rows.quats[:, :1] < 0, -rows.quats, rows.quats)
     return (
         places.tobytes(),
         _bytes(rows.opacities * 255),
-        _bytes((rows.sh[:, 0] * SPZ_FORMAT.colour_scale + 0.5) * 255),
+        _bytes((rows.sh[:, 0] * _COLOUR_SCALE + 0.5) * 255),
         _bytes((np.log(rows.scales) + 10) * 16),
-        _three_bytes(rows.quats) if version == 2 else _signed_words(rows.quats),
+        _bytes(upright[:, 1:] * 127.5 + 127.5) if version == 2 else _signed_words(rows.quats),
         rest.astype(np.uint8).tobytes(),
     )
-
-
-def _three_bytes(quats: np.ndarray) -> bytes:
-    upright = np.where(quats[:, :1] < 0, -quats, quats)
-    return _bytes(upright[:, 1:] * 127.5 + 127.5)
 
 
 def _signed_words(quats: np.ndarray) -> bytes:

@@ -38,6 +38,10 @@ class Rows:
     def all(self) -> tuple[np.ndarray, ...]:
         return self.means, self.quats, self.scales, self.opacities, self.sh
 
+    def some(self, which: slice) -> "Rows":
+        """Some of the rows, not copied."""
+        return Rows(*(values[which] for values in self.all()))
+
 
 class Gathering:
     """N Gaussians filled in part by part; those with a number that is not finite stay out.
@@ -53,9 +57,8 @@ class Gathering:
         """
         GAUSSIANS.check(most, name, SceneFileError)
         _check_memory(most, num_bases, name)
-        self._rows = Rows(
-            *(np.empty((most, *shape), np.float32) for shape in ((3,), (4,), (3,), (), (num_bases, 3)))
-        )
+        shapes = ((3,), (4,), (3,), (), (num_bases, 3))
+        self._rows = Rows(*(np.empty((most, *shape), np.float32) for shape in shapes))
         self._count = 0
         self.num_seen = 0
 
@@ -78,7 +81,7 @@ class Gathering:
 
     def stored(self) -> Rows:
         """What was taken so far, not copied."""
-        return Rows(*(values[: self._count] for values in self._rows.all()))
+        return self._rows.some(slice(self._count))
 
 
 def _check_memory(most: int, num_bases: int, name: str) -> None:
@@ -132,24 +135,19 @@ def to_scene(
         sh=torch.from_numpy(rows.sh),
     )
     if model != PLAIN:
-        warnings = [*warnings, _said_of(model)]
+        kinds = {ANTIALIASED: "smoothed splats", FLAT: "flat splats (2DGS)"}
+        made = kinds.get(model, f"splats of a kind that is not known here ({model[:40]})")
+        warnings = [*warnings, f"The scene was made for {made}, which are drawn as plain ones here."]
     scene = bare_scene(gaussians, name, tuple(warnings))
     return scene.with_record(antialiased=model == ANTIALIASED)
 
 
-def _said_of(model: str) -> str:
-    kinds = {ANTIALIASED: "smoothed splats", FLAT: "flat splats (2DGS)"}
-    made = kinds.get(model, f"splats of a kind that is not known here ({model[:40]})")
-    return f"The scene was made for {made}, which are drawn as plain ones here."
-
-
 def parts(gaussians: Gaussians) -> Iterator[Rows]:
     """Activated rows on the CPU, `STORED.rows_at_once` at a time."""
+    fields = (gaussians.means, gaussians.quats, gaussians.scales, gaussians.opacities, gaussians.sh)
     for first in range(0, len(gaussians), STORED.rows_at_once):
-        fields = (gaussians.means, gaussians.quats, gaussians.scales, gaussians.opacities, gaussians.sh)
-        yield Rows(
-            *(values[first : first + STORED.rows_at_once].detach().cpu().float().numpy() for values in fields)
-        )
+        some = slice(first, first + STORED.rows_at_once)
+        yield Rows(*(values[some].detach().cpu().float().numpy() for values in fields))
 
 
 def logit(opacities: np.ndarray) -> np.ndarray:

@@ -13,7 +13,9 @@ Source: OpenUSD 26.03 and later, the schemas of usdVol (generatedSchema.usda).
 
 import importlib.util
 import tempfile
+from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 
@@ -102,23 +104,18 @@ def is_installed() -> bool:
 def _pxr():
     """The modules of usd-core that are needed, None where it is absent or older than the schema."""
     try:
-        from types import SimpleNamespace
-
-        from pxr import Gf, Sdf, Tf, Usd, UsdGeom, UsdUtils, UsdVol, Vt
+        from pxr import Sdf, Tf, Usd, UsdGeom, UsdUtils, UsdVol, Vt
     except ImportError:
         return None
-    if not hasattr(UsdVol, _KIND):
-        return None
-    return SimpleNamespace(
-        Gf=Gf, Sdf=Sdf, Tf=Tf, Usd=Usd, UsdGeom=UsdGeom, UsdUtils=UsdUtils, UsdVol=UsdVol, Vt=Vt
-    )
+    modules = {"Sdf": Sdf, "Tf": Tf, "Usd": Usd, "UsdGeom": UsdGeom, "UsdUtils": UsdUtils}
+    return SimpleNamespace(**modules, UsdVol=UsdVol, Vt=Vt) if hasattr(UsdVol, _KIND) else None
 
 
 _Prim = tuple[Rows, np.ndarray, str, Encoding]
 
 
 def _prim(part: Part, name: str) -> _Prim:
-    """A prim's arrays in its own axes, where it stands (4, 4), the stage's axes, and how colours are encoded."""
+    """A prim's arrays in its own axes, its place (4, 4), the stage's axes, and how colours are encoded."""
     means, quats, scales, opacities, flat = (part.arrays[name] for name in (*ARRAYS, HARMONICS))
     count, degree = len(means), part.facts["degree"]
     bases = (degree + 1) ** 2 if degree is not None and 0 <= degree <= 10 else 0
@@ -137,16 +134,12 @@ def _gather_prims(prims: list[_Prim], name: str) -> Gathering:
     gathering = Gathering(sum(len(rows.means) for rows, *_ in prims), num_bases, name)
     for rows, place, axes, encoding in prims:
         for first in range(0, len(rows.means), STORED.rows_at_once):
-            some = Rows(*(values[first : first + STORED.rows_at_once] for values in rows.all()))
+            some = rows.some(slice(first, first + STORED.rows_at_once))
             some = with_srgb_colours(some) if encoding.linear else some
-            gathering.add(_pad_harmonics(place_rows(some, place, axes), num_bases))
+            placed = place_rows(some, place, axes)
+            missing = num_bases - placed.sh.shape[1]
+            gathering.add(replace(placed, sh=np.pad(placed.sh, ((0, 0), (0, missing), (0, 0)))))
     return gathering
-
-
-def _pad_harmonics(rows: Rows, num_bases: int) -> Rows:
-    missing = num_bases - rows.sh.shape[1]
-    sh = np.pad(rows.sh, ((0, 0), (0, missing), (0, 0))) if missing else rows.sh
-    return Rows(rows.means, rows.quats, rows.scales, rows.opacities, sh)
 
 
 def _write_stage(scene: Scene, path: Path, pxr) -> None:

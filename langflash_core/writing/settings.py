@@ -55,10 +55,6 @@ class Paper:
     """Millimetres for the list."""
     row: float = 7.4
     """Millimetres of the list."""
-    wall: float = 1.5
-    """Millimetres of lines of walls."""
-    thin: float = 0.25
-    """Millimetres of other lines."""
     hangs: float = 0.7
     """Of the height of its top, from which its lower end is over what stands below."""
     badge: float = 1.9

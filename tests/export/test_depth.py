@@ -10,8 +10,7 @@ from hypothesis import strategies as st
 from PIL import Image
 
 from langflash_core.errors import MissingPackageError, OutputError
-from langflash_core.export.depth import fitting_step, lengths, write_depth_exr, write_depth_png
-from langflash_core.export.settings import DEPTH_FILE
+from langflash_core.export.depth import LARGEST, fitting_step, lengths, write_depth_exr, write_depth_png
 from langflash_core.types import Frame
 
 DEPTHS = np.array([[0.0, 0.5, 1.0], [2.0, 3.7, 6.5]])
@@ -29,14 +28,14 @@ def test_a_png_times_its_step_is_the_depth(tmp_path):
 
 def test_something_near_is_never_nothing(tmp_path):
     write_depth_png(tmp_path / "a.png", np.array([[1e-9, 1e9, 0.0]]), 1.0, "scene")
-    assert np.asarray(Image.open(tmp_path / "a.png")).tolist() == [[1, DEPTH_FILE.largest, 0]]
+    assert np.asarray(Image.open(tmp_path / "a.png")).tolist() == [[1, LARGEST, 0]]
 
 
 @given(st.floats(1e-6, 1e6))
 def test_a_step_is_round_and_wastes_little(longest):
     step = fitting_step(longest)
-    assert longest / step <= DEPTH_FILE.largest * (1 + 1e-12)
-    assert longest / step > DEPTH_FILE.largest / 2.6  # 2 to 5 is the widest gap
+    assert longest / step <= LARGEST * (1 + 1e-12)
+    assert longest / step > LARGEST / 2.6  # 2 to 5 is the widest gap
     assert f"{step:.0e}"[0] in "125" and float(f"{step:.0e}") == step
 
 
