@@ -19,11 +19,12 @@ from jaxtyping import Float
 from torch import Tensor
 from torch.nn import functional as F
 
+from langflash_core.base.picture_files import decoded_photo
 from langflash_core.errors import InputError, PromptError
 from langflash_core.language.lessons import Lesson, Lessons, fitting
 from langflash_core.network import LangFlashNet, load_network
 from langflash_core.network.encoders.shared import tokens_to_maps
-from langflash_core.scene.atoms import atom_cells, decoded_photo
+from langflash_core.scene.atoms import atom_cells
 from langflash_core.types import NO_LANGUAGE, Scene
 
 PRESET = "mini"

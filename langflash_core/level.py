@@ -19,11 +19,12 @@ import numpy as np
 import torch
 from jaxtyping import Bool, Float
 
-from langflash_core.base.picture_files import STORED, opened_picture
+from langflash_core.base.picture_files import decoded_photo
 from langflash_core.base.records import Guess, World
 from langflash_core.errors import InputError, LangFlashError
 from langflash_core.geometry.lines import edge_planes
 from langflash_core.geometry.manhattan import Directions, Sights, found_directions
+from langflash_core.geometry.pinhole import see
 from langflash_core.geometry.rotations import turn_of
 from langflash_core.geometry.surfels import covered_areas, normals_of
 from langflash_core.language.answers import world_points
@@ -74,8 +75,6 @@ class Levelling:
 
 
 LEVELLING = Levelling()
-
-
 _WORDS = ("floor", "rug", "ceiling", "door")
 _CALLED = ("ceiling", "door")
 
@@ -107,6 +106,11 @@ class Evidence:
     error: float
     height: float = 0.0
 
+    @staticmethod
+    def of_height(name: str, usual: tuple[float, float], found: float) -> "Evidence":
+        """What is usually so high, metres and deviation, was found at a height in scene units."""
+        return Evidence(name, usual[0] / found, usual[1], usual[0])
+
     def misses(
         self, scales: Float[np.ndarray, "*s"], offsets: Float[np.ndarray, "*o"]
     ) -> Float[np.ndarray, "..."]:
@@ -137,20 +141,16 @@ def found_world(
     """
     surface = surface_of(scene)
     found = found_directions(_sights(scene, surface), None if up is None else _unit("up", up))
-    upward = found.up
-    ahead, north_by = _north(scene, found, north)
+    upward, (ahead, north_by) = found.up, _north(scene, found, north)
     axes = np.stack((np.cross(ahead, upward), -upward, ahead))  # rows east, down, north
     eyes = scene.viewmats.double().inverse()[:, :3, 3].numpy()
     height, floor_by = _floor(surface, upward, float((eyes @ upward).min()) if scene.photos else math.inf)
-    if origin is None:
-        under = eyes[0]
-        place = under - upward * (under @ upward - height)
-    else:
+    place = eyes[0] - upward * (eyes[0] @ upward - height)
+    if origin is not None:
         place, floor_by = _vector("origin", origin), "told"
-    edged = found.edges > 0
-    up_by, error = (
-        ("told", 0.0) if up is not None else ("edges" if edged else "surfaces", round(found.error, 2))
-    )
+    up_by, error = "edges" if found.edges > 0 else "surfaces", round(found.error, 2)
+    if up is not None:
+        up_by, error = "told", 0.0
     from scipy.spatial.transform import Rotation  # .08 s, which reading a scene has not to wait for
 
     w, x, y, z = Rotation.from_matrix(axes).as_quat(scalar_first=True).tolist()
@@ -209,9 +209,8 @@ def on_its_head(scene: Scene, up: Float[np.ndarray, "3"]) -> bool:
         return False
     answers, threshold = _relevance(some)
     floor, ceiling = answers[:, _WORDS.index("floor")], answers[:, _WORDS.index("ceiling")]
-    below, above = (
-        (one >= threshold) & (one > other) for one, other in ((floor, ceiling), (ceiling, floor))
-    )  # either word may find both
+    # Either word may find both.
+    below, above = (floor >= threshold) & (floor > ceiling), (ceiling >= threshold) & (ceiling > floor)
     if below.mean() < LEVELLING.share or above.mean() < LEVELLING.share:
         return False
     heights = some.gaussians.means.double().numpy() @ up
@@ -258,7 +257,7 @@ def _sights(scene: Scene, surface: Surface) -> Sights:
     """What photos and surfaces tell of directions."""
     edges, lengths = [np.zeros((0, 3))], [np.zeros(0)]
     for view, photo in enumerate(scene.photos):
-        grey = _grey(photo)
+        grey = decoded_photo(photo, "L")  # without those that are damaged there are surfaces still
         if grey is not None:
             found, long = edge_planes(grey, scene.camera(view, grey.shape[1], grey.shape[0]))
             edges.append(found)
@@ -269,14 +268,6 @@ def _sights(scene: Scene, surface: Surface) -> Sights:
         across = np.linalg.eigh(surface.normals[floor].T @ surface.normals[floor])[1][:, 2]
     cameras = scene.viewmats[:, :3, :3].double().numpy()
     return Sights(np.concatenate(edges), np.concatenate(lengths), surface.normals[known], cameras, across)
-
-
-def _grey(photo: bytes) -> np.ndarray | None:
-    try:
-        with opened_picture(photo, STORED) as opened:
-            return np.asarray(opened.convert("L"))
-    except (OSError, SyntaxError, ValueError):  # a scene whose small photos are damaged still has surfaces
-        return None
 
 
 def _north(scene: Scene, found: Directions, north: Sequence[float] | None) -> tuple[np.ndarray, str]:
@@ -332,14 +323,7 @@ def evidence(scene: Scene, world: World, surface: Surface) -> list[Evidence]:
         eyes = scene.viewmats.double().inverse()[:, :3, 3].numpy() if scene.photos else np.zeros((0, 3))
         eye = -((eyes - np.array(world.origin)) @ turn_of(world).T)[:, 1]
         if len(eye) and np.median(eye) > 0:
-            found.append(
-                Evidence(
-                    "camera height",
-                    LEVELLING.eye[0] / float(np.median(eye)),
-                    LEVELLING.eye[1],
-                    LEVELLING.eye[0],
-                )
-            )
+            found.append(Evidence.of_height("camera height", LEVELLING.eye, float(np.median(eye))))
     posed = not torch.allclose(scene.viewmats[0], torch.eye(4), atol=1e-4)
     if scene.record.network_unit and not posed:  # else its unit is that of the poses
         found.append(Evidence("depth", LEVELLING.depth[0] * scene.record.network_unit, LEVELLING.depth[1]))
@@ -370,12 +354,9 @@ def guess_scale(found: Sequence[Evidence]) -> Guess | None:
     mean = float(chances.sum(1) @ scales)
     error = math.sqrt(float(chances.sum(1) @ (scales - mean) ** 2))
     floor = float(chances[:, 0].sum()) >= 0.5
-    agree = [
-        each
-        for each in found
-        if (floor or not each.height)
-        and abs(each.misses(np.array(mean), np.array(0.0))) <= LEVELLING.contradicted
-    ]
+    told = [each for each in found if floor or not each.height]
+    here = np.array(mean), np.array(0.0)
+    agree = [each for each in told if abs(each.misses(*here)) <= LEVELLING.contradicted]
     names = tuple(each.name for each in sorted(agree or found, key=lambda each: each.error))
     low, middle, high = (math.exp(mean + step) for step in (-error, 0.0, error))
     return Guess(middle, low, high, names)
@@ -389,11 +370,7 @@ def _of_ceiling(surface: Surface, heights: np.ndarray, turn: np.ndarray) -> list
         return []
     top = float(np.quantile(heights, 0.995))
     high = densest(heights[named], LEVELLING.window * top)
-    return (
-        [Evidence("ceiling", LEVELLING.ceiling[0] / high, LEVELLING.ceiling[1], LEVELLING.ceiling[0])]
-        if high > 0.85 * top
-        else []
-    )
+    return [Evidence.of_height("ceiling", LEVELLING.ceiling, high)] if high > 0.85 * top else []
 
 
 def _of_door(scene: Scene, surface: Surface, heights: np.ndarray) -> list[Evidence]:
@@ -403,27 +380,26 @@ def _of_door(scene: Scene, surface: Surface, heights: np.ndarray) -> list[Eviden
         return []
     low, high = np.quantile(heights[named], (0.03, 0.97))
     top = surface.places[named][heights[named] >= 0.97 * high]
-    if (
-        high <= 0
-        or low > 0.12 * high
-        or not any(_inside(scene, view, top) for view in range(scene.num_views))
-    ):
+    stands = high > 0 and low <= 0.12 * high
+    if not (stands and any(_inside(scene, view, top) for view in range(scene.num_views))):
         return []
-    return [Evidence("door", LEVELLING.door[0] / float(high), LEVELLING.door[1], LEVELLING.door[0])]
+    return [Evidence.of_height("door", LEVELLING.door, float(high))]
 
 
 def _inside(scene: Scene, view: int, places: np.ndarray) -> bool:
     """Whether a photo has most of these places, and none near its border."""
-    camera = scene.camera(view)
-    viewmat, K = camera.viewmat.double().numpy(), camera.K.double().numpy()
-    pos_c = places @ viewmat[:3, :3].T + viewmat[:3, 3]
-    with np.errstate(all="ignore"):
-        pixels = (pos_c / pos_c[:, 2:]) @ K[:2].T
-    size = np.array([camera.width, camera.height])
-    well = (pos_c[:, 2] > 0) & (
-        (pixels > LEVELLING.edge * size) & (pixels < (1 - LEVELLING.edge) * size)
-    ).all(1)
-    return bool(well.mean() > 0.9)
+    shares, depths = picture_shares(scene.camera(view), places)
+    well = ((shares > LEVELLING.edge) & (shares < 1 - LEVELLING.edge)).all(1)
+    return bool(((depths > 0) & well).mean() > 0.9)
+
+
+def picture_shares(
+    camera: Camera, places: Float[np.ndarray, "n 3"]
+) -> tuple[Float[np.ndarray, "n 2"], Float[np.ndarray, " n"]]:
+    """Where places are in a picture, of its width and height, and their depths."""
+    size = camera.width, camera.height
+    seen = see(places, camera.viewmat.double().numpy(), camera.K.double().numpy(), size)
+    return np.stack((seen.x, seen.y), 1) / size, seen.z
 
 
 def _unit(name: str, values: Sequence[float]) -> np.ndarray:
@@ -482,10 +458,8 @@ def seen_at(scene: Scene, view: int, u: float, v: float) -> tuple[float, float, 
     """
     width, height = scene.view_size
     if not 0 <= view < scene.num_views or not (0 <= u <= width and 0 <= v <= height):
-        raise InputError(
-            f"{view + 1}:{u:g},{v:g} is no pixel of a photo; this scene has photos 1 to {scene.num_views} of "
-            f"{width} x {height} pixels"
-        )
+        photos = f"photos 1 to {scene.num_views} of {width} x {height} pixels"
+        raise InputError(f"{view + 1}:{u:g},{v:g} is no pixel of a photo; this scene has {photos}")
     whole = scene.camera(view)
     K = whole.K.clone()
     K[0, 2], K[1, 2] = K[0, 2] - u + 0.5, K[1, 2] - v + 0.5  # its middle is the pixel of a picture of one

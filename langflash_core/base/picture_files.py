@@ -17,6 +17,8 @@ from io import BufferedIOBase
 from pathlib import Path
 from typing import IO, cast
 
+import numpy as np
+from jaxtyping import UInt8
 from PIL import Image
 
 from langflash_core.base.limits import PIXELS, PROFILE
@@ -85,6 +87,15 @@ def picture_block(picture: Image.Image, name: str) -> bytes | None:
     """A block of a picture's file, "icc_profile" or "exif"; None where there is none, or one too long."""
     block = picture.info.get(name)
     return block if isinstance(block, bytes) and block and not PROFILE.passed_by(len(block)) else None
+
+
+def decoded_photo(photo: bytes, mode: str = "RGB") -> UInt8[np.ndarray, "H W *c"] | None:
+    """The pixels of a picture inside a scene, in a mode of Pillow's; None where it is damaged."""
+    try:
+        with opened_picture(photo, STORED) as opened:
+            return np.asarray(opened.convert(mode))
+    except (OSError, SyntaxError, ValueError):
+        return None
 
 
 def stored_shape(picture: Image.Image) -> tuple[tuple[int, int], int]:

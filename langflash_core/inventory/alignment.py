@@ -17,10 +17,9 @@ import numpy as np
 from jaxtyping import Float
 from scipy.spatial.transform import Rotation
 
-from langflash_core.base.picture_files import STORED, opened_picture
+from langflash_core.base.picture_files import decoded_photo
 from langflash_core.errors import InputError
 from langflash_core.geometry.cameras import invert_rigid
-from langflash_core.geometry.rotations import turn_of
 from langflash_core.inventory.settings import ALIGNMENT
 from langflash_core.inventory.things import Inventory
 from langflash_core.language.settings import ANSWERING
@@ -80,13 +79,9 @@ def _describe_keypoints(found: Inventory, render: Render) -> tuple[np.ndarray, n
     descriptors: list[np.ndarray] = [np.zeros((0, 128), np.float32)]
     sift = cv2.SIFT.create(ALIGNMENT.points, contrastThreshold=0.01)
     for view, photo in enumerate(found.scene.photos):
-        try:
-            with opened_picture(photo, STORED) as opened:
-                grey = np.asarray(opened.convert("L"))
-        except (OSError, SyntaxError, ValueError):
-            continue
-        points, described = sift.detectAndCompute(np.ascontiguousarray(grey), None)
-        if described is None:
+        grey = decoded_photo(photo, "L")
+        points, described = ([], None) if grey is None else sift.detectAndCompute(grey.copy(), None)
+        if grey is None or described is None:
             continue
         camera = found.scene.camera(view)
         frame = render(found.scene, camera, weight_maps=False)
@@ -109,12 +104,7 @@ def _world_places(
     rays = np.concatenate((pixels, np.ones((len(pixels), 1))), 1) @ np.linalg.inv(camera.K.double().numpy()).T
     pose = invert_rigid(camera.viewmat.double()).cpu().numpy()
     points = (rays * depths[:, None]) @ pose[:3, :3].T + pose[:3, 3]
-    return _upright_points(found, points), covered & (depths > 0)
-
-
-def _upright_points(found: Inventory, points: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 3"]:
-    """Points of the scene in its world, in the inventory's unit."""
-    return found.scale * (points - np.array(found.world.origin)) @ turn_of(found.world).T
+    return found.stand(points), covered & (depths > 0)
 
 
 def _match_keypoints(ours, theirs) -> tuple[np.ndarray, np.ndarray]:

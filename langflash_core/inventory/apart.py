@@ -32,7 +32,10 @@ def taken_apart(
         fits: whether some of them, by their places, are one thing.
     """
     first, last = _spans(tree.parents)
-    children = _children(tree.parents)
+    children: list[list[int]] = [[] for _ in range(len(tree.parents))]
+    for region, parent in enumerate(tree.parents.tolist()):
+        if parent >= 0:
+            children[parent].append(region)
     places, numbers, count = np.append(first, -1)[leaves], np.full(len(leaves), -1), 0
     todo = [(int(root), np.flatnonzero(leaves >= 0)) for root in np.flatnonzero(tree.parents < 0)]
     while todo:
@@ -53,15 +56,6 @@ def taken_apart(
         else:
             todo += large
     return numbers
-
-
-def _children(parents: Integer[np.ndarray, " t"]) -> list[list[int]]:
-    """Of each region those that it was made of."""
-    children: list[list[int]] = [[] for _ in range(len(parents))]
-    for region, parent in enumerate(parents.tolist()):
-        if parent >= 0:
-            children[parent].append(region)
-    return children
 
 
 def _spans(parents: Integer[np.ndarray, " t"]) -> tuple[Integer[np.ndarray, " t"], Integer[np.ndarray, " t"]]:

@@ -66,10 +66,8 @@ def difference(first: Inventory, second: Inventory, render: Render) -> Differenc
             f"one scene speaks {spaces[0]}, the other {spaces[1]}; make both with the same language"
         )
     fit, metre = align_scenes(first, second, render), first.metre
-    fates = (
-        fate(first, second, fit.inverse, render, metre / fit.scale),
-        fate(second, first, fit, render, metre),
-    )
+    ours = fate(first, second, fit.inverse, render, metre / fit.scale)
+    fates = ours, fate(second, first, fit, render, metre)
     every = (*first.things, *unsure(first)), (*second.things, *unsure(second))
     gone, come = _absent(first, fates[0]), _absent(second, fates[1])
     moved = _pair_things(_look_at_things(first, gone), _look_at_things(second, come, fit), metre, far=True)
@@ -77,9 +75,8 @@ def difference(first: Inventory, second: Inventory, render: Render) -> Differenc
         [thing for thing in things if not _has_gone(found, thing, told)]
         for found, things, told in zip((first, second), every, fates, strict=True)
     ]
-    still = _pair_things(
-        _look_at_things(first, here[0]), _look_at_things(second, here[1], fit), metre, far=False
-    )
+    looks = _look_at_things(first, here[0]), _look_at_things(second, here[1], fit)
+    still = _pair_things(*looks, metre, far=False)
     flat = [pair for pair in still if _flat(pair.before, metre) and pair.by > _still(pair.before, metre)]
     had = {pair.before.id for pair in (*moved, *still)} | {thing.id for thing in gone}
     listed = {thing.id for thing in first.things}
@@ -109,9 +106,7 @@ def _stands(found: Inventory, told: Fate) -> Bool[np.ndarray, " N"]:
     gone."""
     numbers, own = found.parts.numbers, found.shares.sum(0)
     some, count = numbers >= 0, len(found.parts.kinds)
-    known, gone = (
-        np.bincount(numbers[some], (own * which)[some], count) for which in (told.known, told.gone)
-    )
+    known, gone = (np.bincount(numbers[some], (own * w)[some], count) for w in (told.known, told.gone))
     return np.append(gone < BESIDE.edge * known, False)[numbers]
 
 

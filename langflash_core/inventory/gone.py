@@ -18,13 +18,14 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
 from langflash_core.geometry.harmonics import SH_C0
+from langflash_core.geometry.pinhole import see
 from langflash_core.geometry.rotations import turn_of
 from langflash_core.inventory.alignment import Fit, Render
 from langflash_core.inventory.settings import GONE
 from langflash_core.inventory.things import Inventory
 from langflash_core.language.settings import ANSWERING
 from langflash_core.scene.instances import touching
-from langflash_core.types import Camera, Scene, Semantics
+from langflash_core.types import Scene, Semantics
 
 
 @dataclass(frozen=True)
@@ -57,15 +58,9 @@ def fate(whose: Inventory, other: Inventory, fit: Fit, render: Render, metre: fl
     world = other.world
     points = fit.placed(whose.stands) / other.scale @ turn_of(world) + np.array(world.origin)
     own = whose.scene.semantics
-    unit = _unit(own)
-    sights = [
-        _sight(other.scene, view, points, own, unit, render, other.scale / metre)
-        for view in range(other.scene.num_views)
-    ]
-    return _judge_fate(sights, 0.5 + SH_C0 * whose.scene.gaussians.sh[:, 0].double().numpy())
-
-
-def _judge_fate(sights: list[_Sight], colours: Float[np.ndarray, "N 3"]) -> Fate:
+    unit, views = _unit(own), range(other.scene.num_views)
+    sights = [_sight(other.scene, view, points, own, unit, render, other.scale / metre) for view in views]
+    colours = 0.5 + SH_C0 * whose.scene.gaussians.sh[:, 0].double().numpy()
     differ = _differ(sights, colours)
     known, gone = np.zeros(len(colours), bool), np.zeros(len(colours), bool)
     for sight in sights:
@@ -106,15 +101,17 @@ def _sight(
     camera = scene.camera(view)
     frame = render(scene, camera)
     assert frame.weight_maps is not None, "render draws weight maps unless told otherwise"
-    columns, rows, depth, inside = _pixels(camera, points)
-    met = inside & (frame.alphas.cpu().numpy()[rows, columns] >= ANSWERING.covered_alpha)
+    size = camera.width, camera.height
+    there = see(points, camera.viewmat.double().numpy(), camera.K.double().numpy(), size)
+    columns, rows = (np.where(there.inside, pixels, 0).astype(int) for pixels in (there.x, there.y))
+    met = there.inside & (frame.alphas.cpu().numpy()[rows, columns] >= ANSWERING.covered_alpha)
     chosen, cosines = np.flatnonzero(met), np.zeros(len(points))
     maps = frame.weight_maps.cpu().numpy()[rows[chosen], columns[chosen]].astype(float)
     ids = own.weight_ids.numpy()[chosen]
     cosines[chosen] = _cosines(maps, scene.semantics, ids, unit[chosen], own)
     seen = frame.depths.cpu().double().numpy()[rows, columns]
     colours = frame.rgb.cpu().double().numpy()[rows, columns]
-    return _Sight(met, metres * (seen - depth), metres * np.abs(depth), cosines, colours)
+    return _Sight(met, metres * (seen - there.z), metres * np.abs(there.z), cosines, colours)
 
 
 def _unit(semantics: Semantics) -> Float[np.ndarray, "N S"]:
@@ -148,25 +145,6 @@ def _cosines(
     return both / np.sqrt(squares.clip(1e-24))
 
 
-def _pixels(
-    camera: Camera, points: Float[np.ndarray, "N 3"]
-) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """(N,) column, row, depth of points, and which are in the picture; the others have the first pixel."""
-    viewmat, K = camera.viewmat.double().numpy(), camera.K.double().numpy()
-    pos_c = points @ viewmat[:3, :3].T + viewmat[:3, 3]
-    with np.errstate(all="ignore"):
-        columns, rows = np.nan_to_num((pos_c / pos_c[:, 2:]) @ K[:2].T, nan=-1.0).T
-    inside = (
-        (pos_c[:, 2] > 0) & (columns >= 0) & (rows >= 0) & (columns < camera.width) & (rows < camera.height)
-    )
-    return (
-        np.where(inside, columns, 0).astype(int),
-        np.where(inside, rows, 0).astype(int),
-        pos_c[:, 2],
-        inside,
-    )
-
-
 def changes(found: Inventory, gone: Bool[np.ndarray, " N"]) -> list[Integer[np.ndarray, " n"]]:
     """Rows of each change, the largest first: what has gone, touches, and fills `GONE.least` of a photo."""
     starts, others = touching(found.scene.gaussians)
@@ -174,11 +152,8 @@ def changes(found: Inventory, gone: Bool[np.ndarray, " N"]) -> list[Integer[np.n
     graph = coo_matrix((np.ones(int(both.sum()), bool), (starts[both], others[both])), (len(gone), len(gone)))
     rows = np.flatnonzero(gone)
     numbers = np.unique(connected_components(graph, directed=False)[1][rows], return_inverse=True)[1]
-    sizes = (
-        np.stack([np.bincount(numbers, row[rows]) for row in found.shares]).max(0)
-        if len(rows)
-        else np.zeros(0)
-    )
-    return [
-        rows[numbers == number] for number in np.argsort(-sizes, kind="stable") if sizes[number] >= GONE.least
-    ]
+    if not len(rows):
+        return []
+    sizes = np.stack([np.bincount(numbers, row[rows]) for row in found.shares]).max(0)
+    order = np.argsort(-sizes, kind="stable")
+    return [rows[numbers == number] for number in order if sizes[number] >= GONE.least]

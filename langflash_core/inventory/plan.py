@@ -79,10 +79,13 @@ class Plan:
 
 def floor_plan(found: Inventory) -> Plan:
     """The plan of an inventory."""
-    metre = 1.0 if found.unit == "m" else _room_size(found) / 4
+    metre = 1.0
+    if found.unit != "m":  # by the median of its extents on the floor: rooms are 4 m across
+        low, high = np.nanquantile(found.stands[:, [0, 2]], (0.02, 0.98), axis=0)
+        metre = float(max(np.median(high - low), 1e-6)) / 4
     pieces = _upright_pieces(found, metre)
     turn = _common_turn(pieces)
-    matrix = _rotation_matrix(turn)
+    matrix = np.array([[math.cos(turn), math.sin(turn)], [-math.sin(turn), math.cos(turn)]])
     walls = _extend_to_corners(_walls(pieces.along(matrix), metre), metre)
     walls = [_back(wall, matrix) for wall in walls]
     others = [thing for thing in found.things if thing.kind not in OPENINGS]
@@ -90,16 +93,8 @@ def floor_plan(found: Inventory) -> Plan:
     placed = ((thing, _in_wall(thing, walls, metre)) for thing in found.things if thing.kind in OPENINGS)
     openings = [Opening(thing, *place) for thing, place in placed if place is not None]
     astray = {thing.id for thing in others if any(goes_through(thing, wall, metre) for wall in walls)}
-    return Plan(
-        tuple(walls),
-        tuple(openings),
-        tuple(others),
-        frozenset(astray),
-        _eyes(found),
-        math.degrees(turn),
-        found.unit,
-        found.guess,
-    )
+    parts = tuple(walls), tuple(openings), tuple(others), frozenset(astray)
+    return Plan(*parts, _eyes(found), math.degrees(turn), found.unit, found.guess)
 
 
 def goes_through(thing: Thing, wall: PlanWall, metre: float) -> bool:
@@ -109,12 +104,6 @@ def goes_through(thing: Thing, wall: PlanWall, metre: float) -> bool:
     middle = float((thing.corners.mean(0) - start) @ along)
     deep = FLOOR_PLAN.across * metre
     return bool(aside.min() < -deep and aside.max() > deep and 0 < middle < wall.length)
-
-
-def _room_size(found: Inventory) -> float:
-    """Of a scene without a scale: the median of its extents on the floor."""
-    low, high = np.nanquantile(found.stands[:, [0, 2]], (0.02, 0.98), axis=0)
-    return float(max(np.median(high - low), 1e-6))
 
 
 @dataclass(frozen=True)
@@ -137,13 +126,8 @@ def _upright_pieces(found: Inventory, metre: float) -> _Pieces:
     flat = normals[:, [0, 2]]
     length = np.linalg.norm(flat, axis=1)
     kinds, areas = kinds_of(scene), covered_areas(scene.gaussians)
-    chosen = (
-        np.isin(kinds, _OF_WALLS)
-        & (np.abs(normals[:, 1]) < FLOOR_PLAN.upright)
-        & (length > 0.5)
-        & (areas > 0)
-    )
-    chosen &= np.isfinite(found.stands).all(1)
+    upright = (np.abs(normals[:, 1]) < FLOOR_PLAN.upright) & (length > 0.5)
+    chosen = np.isin(kinds, _OF_WALLS) & upright & (areas > 0) & np.isfinite(found.stands).all(1)
     stands = found.stands[chosen]
     places, weights = stands[:, [0, 2]], areas[chosen]
     if eyes := _eyes(found):
@@ -156,10 +140,6 @@ def _common_turn(pieces: _Pieces) -> float:
     azimuths = 4 * np.arctan2(pieces.normals[:, 1], pieces.normals[:, 0])
     mean = complex(pieces.weights @ np.exp(1j * azimuths)) if len(azimuths) else 0j
     return 0.0 if abs(mean) < 1e-12 else math.atan2(mean.imag, mean.real) / 4
-
-
-def _rotation_matrix(turn: float) -> np.ndarray:
-    return np.array([[math.cos(turn), math.sin(turn)], [-math.sin(turn), math.cos(turn)]])
 
 
 def _walls(pieces: _Pieces, metre: float) -> list[PlanWall]:
@@ -177,10 +157,8 @@ def _walls(pieces: _Pieces, metre: float) -> list[PlanWall]:
             for low, high in _runs(along[near], weights[near], metre):
                 own = near & (along >= low) & (along <= high)
                 share = float(weights[own].sum()) / total
-                if (
-                    share >= FLOOR_PLAN.least / 2
-                    and weighted_quantile(heights[own], weights[own], 0.9) >= tall
-                ):
+                high_enough = weighted_quantile(heights[own], weights[own], 0.9) >= tall
+                if share >= FLOOR_PLAN.least / 2 and high_enough:
                     ends = ((exact, low), (exact, high)) if axis == 0 else ((low, exact), (high, exact))
                     down = weighted_quantile(heights[own], weights[own], 0.02) / metre
                     walls.append(PlanWall(*ends, share, _doubt((high - low) / metre, down, share)))
@@ -239,17 +217,14 @@ def _extend_to_corners(walls: list[PlanWall], metre: float) -> list[PlanWall]:
     """Walls whose ends lie on the walls that they meet."""
     met = []
     for wall in walls:
-        axis = _axis(wall)
-        ends = []
+        axis, ends = _axis(wall), []
+        others, far = [other for other in walls if _axis(other) != axis], FLOOR_PLAN.meets * metre
         for end in (wall.start, wall.end):
+            across = [(sorted((w.start[axis], w.end[axis])), w.start[1 - axis]) for w in others]
             near = [
-                other.start[1 - axis]
-                for other in walls
-                if _axis(other) != axis
-                and abs(other.start[1 - axis] - end[1 - axis]) <= FLOOR_PLAN.meets * metre
-                and min(other.start[axis], other.end[axis]) - FLOOR_PLAN.meets * metre
-                <= wall.start[axis]
-                <= max(other.start[axis], other.end[axis]) + FLOOR_PLAN.meets * metre
+                place
+                for (low, high), place in across
+                if abs(place - end[1 - axis]) <= far and low - far <= wall.start[axis] <= high + far
             ]
             place = min(near, key=lambda value: abs(value - end[1 - axis])) if near else end[1 - axis]
             ends.append((end[0], place) if axis == 0 else (place, end[1]))
@@ -279,11 +254,8 @@ def _in_wall(thing: Thing, walls: list[PlanWall], metre: float) -> tuple[Place, 
         aside = middle - start
         across = abs(float(along[0] * aside[1] - along[1] * aside[0]))
         reach = np.abs((thing.corners - middle) @ along).max()
-        if (
-            across <= FLOOR_PLAN.hangs * metre
-            and -reach <= place <= wall.length + reach
-            and (best is None or across < best[0])
-        ):
+        near = across <= FLOOR_PLAN.hangs * metre and -reach <= place <= wall.length + reach
+        if near and (best is None or across < best[0]):
             ends = (start + along * np.clip(place + step * reach, 0, wall.length) for step in (-1, 1))
             low, high = (tuple(point.tolist()) for point in ends)
             best = (across, low, high)
@@ -294,8 +266,7 @@ def _eyes(found: Inventory) -> tuple[Place, ...]:
     if not found.scene.photos:
         return ()
     eyes = found.scene.viewmats.double().inverse()[:, :3, 3].numpy()
-    stands = found.scale * (eyes - np.array(found.world.origin)) @ turn_of(found.world).T
-    return tuple((float(east), float(north)) for east, _, north in stands)
+    return tuple((float(east), float(north)) for east, _, north in found.stand(eyes))
 
 
 def weighted_quantile(

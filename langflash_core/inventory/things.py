@@ -34,7 +34,7 @@ from langflash_core.language.relevance import compile_query
 from langflash_core.language.settings import ANSWERING
 from langflash_core.language.spaces import language_space
 from langflash_core.language.vocabulary import OWN
-from langflash_core.level import found_world, metres_of
+from langflash_core.level import found_world, metres_of, picture_shares
 from langflash_core.scene.regions import regions_of
 from langflash_core.segments import evenly, photo_shares
 from langflash_core.surface.fused import fused_rows, told_in_layers
@@ -48,6 +48,7 @@ FLAT = frozenset({
     "broom", "lamp",
 })  # fmt: skip
 """Kinds that may be as thin as they look."""
+Box = tuple[tuple[float, float, float], tuple[float, float, float], float, float]
 _TURNS = np.radians(np.arange(0.0, 90.0, 3.0))
 
 
@@ -89,8 +90,7 @@ class Thing:
         along = np.array([math.cos(turn), math.sin(turn)]) * self.size[0] / 2
         across = np.array([-math.sin(turn), math.cos(turn)]) * self.size[1] / 2
         middle = np.array([self.place[0], self.place[2]])
-        return np.stack((middle - along - across, middle + along - across, middle + along + across,
-                         middle - along + across))  # fmt: skip
+        return middle + np.stack((-along - across, along - across, along + across, across - along))
 
 
 @dataclass(frozen=True)
@@ -129,8 +129,11 @@ class Inventory:
     @cached_property
     def stands(self) -> Float[np.ndarray, "N 3"]:
         """Where the scene's Gaussians are in the world, in `unit`."""
-        means = self.scene.gaussians.means.detach().cpu().double().numpy()
-        return self.scale * (means - np.array(self.world.origin)) @ turn_of(self.world).T
+        return self.stand(self.scene.gaussians.means.detach().cpu().double().numpy())
+
+    def stand(self, places: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 3"]:
+        """Where places of the scene are in the world, in `unit`."""
+        return self.scale * (places - np.array(self.world.origin)) @ turn_of(self.world).T
 
     @property
     def metre(self) -> float:
@@ -324,16 +327,12 @@ def _thing(
     )  # fmt: skip
 
 
-def _box(
-    whole: Inventory, own: np.ndarray, areas: np.ndarray
-) -> tuple[tuple[float, float, float], tuple[float, float, float], float, float]:
+def _box(whole: Inventory, own: np.ndarray, areas: np.ndarray) -> Box:
     """`upright_box` of some rows of the scene."""
     return upright_box(whole.stands[own[evenly(areas[own])]])
 
 
-def upright_box(
-    points: Float[np.ndarray, "n 3"],
-) -> tuple[tuple[float, float, float], tuple[float, float, float], float, float]:
+def upright_box(points: Float[np.ndarray, "n 3"]) -> Box:
     """Middle, size (width, depth, height), turn in degrees and height of the bottom of points in the world.
 
     Extents are from the 2nd to the 98th of a hundred points.
@@ -361,13 +360,7 @@ def _is_cut_off(whole: Inventory, rows: np.ndarray, views: Sequence[int]) -> boo
     """Whether the photos that show it show it only up to their border."""
     means = whole.scene.gaussians.means.double().numpy()[rows]
     for view in views:
-        camera = whole.scene.camera(view)
-        viewmat, K = camera.viewmat.double().numpy(), camera.K.double().numpy()
-        pos_c = means @ viewmat[:3, :3].T + viewmat[:3, 3]
-        with np.errstate(all="ignore"):
-            pixels = (pos_c / pos_c[:, 2:]) @ K[:2].T
-        size = np.array([camera.width, camera.height])
-        outside = (pos_c[:, 2] <= 0) | ((pixels < 0.01 * size) | (pixels > 0.99 * size)).any(1)
-        if outside.mean() < 0.02:
+        shares, depths = picture_shares(whole.scene.camera(view), means)
+        if ((depths <= 0) | ((shares < 0.01) | (shares > 0.99)).any(1)).mean() < 0.02:
             return False
     return True

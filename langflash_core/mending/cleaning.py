@@ -57,7 +57,11 @@ def apply_recipe(scene: Scene, recipe: Recipe) -> Cleaned:
         reasons = {_ALL: scope & ~found}
     if recipe.crop is not None:
         reasons["outside the box"] = ~inside(scene, box_of(scene, recipe.crop, every))
-    return _count_reasons(reasons, len(every))
+    rows, counts = np.zeros(len(every), bool), {}
+    for name, found in reasons.items():
+        counts[name] = int((found & ~rows).sum())
+        rows |= found
+    return Cleaned(rows, counts)
 
 
 def taken_out(scene: Scene, rows: Bool[np.ndarray, " N"], fill_with: Render | None = None) -> Scene:
@@ -146,21 +150,8 @@ def measure_gaussians(scene: Scene, name: str) -> Float[np.ndarray, " N"]:
 
 def _describe_rule(rule: Rule) -> str:
     """A rule for people."""
-    parts = []
+    parts = ["colour"] * (COLOUR in rule)
     for name, limits in rule.items():
-        if name == COLOUR:
-            parts.append("colour")
-            continue
-        parts += [
-            f"{name} {sign} {limit:g}" for sign, limit in zip("><", limits, strict=True) if limit is not None
-        ]
+        bounds = zip("><", limits, strict=True) if name != COLOUR else ()
+        parts += [f"{name} {sign} {limit:g}" for sign, limit in bounds if limit is not None]
     return " and ".join(parts)
-
-
-def _count_reasons(reasons: Mapping[str, Bool[np.ndarray, " N"]], count: int) -> Cleaned:
-    """All of them, each counted for the first reason."""
-    rows, counts = np.zeros(count, bool), {}
-    for name, found in reasons.items():
-        counts[name] = int((found & ~rows).sum())
-        rows |= found
-    return Cleaned(rows, counts)

@@ -61,13 +61,11 @@ def coarsen(part: Scene, side: float, *, squares: bool) -> Scene:
     mean = _means_by(torch.from_numpy(cube), areas, len(cells))
     blocks = _blocks(part.gaussians, mean, cells, side)
     places, of = _tiles(blocks, part.gaussians.means.double(), torch.from_numpy(cube))
-    gaussians = _flat(
-        blocks, places, of, blocks.colours[of] if squares else _run_together(blocks, places, of)
-    )
+    colours = blocks.colours[of] if squares else _run_together(blocks, places, of)
     views, sure = part.view_ids, part.confidences
     return replace(
         part,
-        gaussians=gaussians,
+        gaussians=_flat(blocks, places, of, colours),
         semantics=_semantics(part, areas, cube, len(cells), of),
         view_ids=None if views is None else _a_view(part, cube, len(cells))[of],
         levels=None if part.levels is None else torch.zeros(len(of), dtype=torch.uint8),

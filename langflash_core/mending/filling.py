@@ -87,9 +87,7 @@ def fill(scene: Scene, removed: Tensor, render: Render) -> Scene:
     left = scene.rows(~removed)
     views = _views(scene, left, removed, render)
     none = left.rows(torch.zeros(0, dtype=torch.int64))
-    if not views:
-        return none
-    flat, rest = _on_planes(views, _planes_around(views), none)
+    flat, rest = _on_planes(views, _planes_around(views), none) if views else (none, [])
     for view, missing in zip(views, rest, strict=True):
         flat = append_part(flat, _fill_smoothly(view, missing, append_part(left, flat), render, none))
     return flat
@@ -204,18 +202,14 @@ def _patch(plane: Plane, spots: Float[np.ndarray, "n 3"], views: Sequence[_View]
     along = low + pitch * (np.stack((columns, rows), -1) + 0.5)
     points = along @ basis + plane.normal * plane.offset  # (h, w, 3)
     on_it = FILLING.far * min(max(FILLING.noise * plane.noise, FILLING.narrowest), 2.0)
-    colours, weights, known, through = _sample_views(points.reshape(-1, 3), views, on_it)
+    colours, weights, known, taken = _sample_views(points.reshape(-1, 3), views, on_it)
     known = known if weights is None else known & _common(weights, known)
-    known, through = (each.reshape(shape) for each in (known, through))
-    hole &= ~through & ~_is_covered(points.reshape(-1, 3), views).reshape(shape)
+    known = known.reshape(shape)
+    hole &= ~taken.reshape(shape)
     if not hole.any():
         return none
     coloured = heal(colours.reshape(*shape, 3), known, hole)
-    nearest = np.zeros((2, *shape), int)
-    if known.any():
-        nearest = np.asarray(
-            ndimage.distance_transform_edt(~known, return_distances=False, return_indices=True)
-        )
+    nearest = _nearest(known) if known.any() else np.zeros((2, *shape), int)
     carried = None if weights is None else weights.reshape(*shape, -1)[nearest[0][hole], nearest[1][hole]]
     axes = np.broadcast_to(np.stack((*basis, np.cross(*basis)), -1), (int(hole.sum()), 3, 3))
     sizes = np.full((len(axes), 2), pitch * FILLING.cover)
@@ -248,42 +242,27 @@ def _common(weights: Float[np.ndarray, "n K"], known: Bool[np.ndarray, " n"]) ->
     return (counts >= FILLING.rare * counts.max())[groups]
 
 
-def _is_covered(points: Float[np.ndarray, "n 3"], views: Sequence[_View]) -> Bool[np.ndarray, " n"]:
-    """Points where some view shows a surface just there."""
-    found = np.zeros(len(points), bool)
-    for view in views:
-        inside, rows, columns, z = view.pixels(points)
-        depth = np.where(view.hole[rows, columns], 0.0, view.depths[rows, columns])
-        found |= inside & (depth > 0) & (abs(depth - z) <= 2 * FILLING.far * z)
-    return found
-
-
 def _sample_views(
     points: Float[np.ndarray, "n 3"], views: Sequence[_View], on_it: float
 ) -> tuple[
     Float[np.ndarray, "n 3"], Float[np.ndarray, "n K"] | None, Bool[np.ndarray, " n"], Bool[np.ndarray, " n"]
 ]:
     """Colours and weights of points where a view shows a surface just there, whether one does, and whether
-    one sees through them. on_it: share of the depth to which a surface counts."""
-    colours, known, through = (
-        np.zeros((len(points), 3)),
-        np.zeros(len(points), bool),
-        np.zeros(len(points), bool),
-    )
-    weights = (
-        None if views[0].weights is None else np.zeros((len(points), views[0].weights.shape[-1]), np.float32)
-    )
+    one sees through them, or a surface about there. on_it: share of the depth to which a surface counts."""
+    count, kept = len(points), views[0].weights
+    colours, known, taken = np.zeros((count, 3)), np.zeros(count, bool), np.zeros(count, bool)
+    weights = None if kept is None else np.zeros((count, kept.shape[-1]), np.float32)
     for view in views:
         inside, rows, columns, z = view.pixels(points)
         depth = view.depths[rows, columns]
         open_there = inside & ~view.hole[rows, columns] & (depth > 0)
-        through |= open_there & (depth > FILLING.through * z)
+        taken |= open_there & ((depth > FILLING.through * z) | (abs(depth - z) <= 2 * FILLING.far * z))
         new = open_there & (abs(depth - z) <= on_it * z) & ~known
         colours[new] = view.colours[rows[new], columns[new]]
         if weights is not None and view.weights is not None:
             weights[new] = view.weights[rows[new], columns[new]]
         known |= new
-    return colours, weights, known, through
+    return colours, weights, known, taken
 
 
 def _fill_smoothly(
@@ -306,13 +285,18 @@ def _fill_smoothly(
     axes, sizes = ellipses(*spans(points, footprint))
     pose = invert_rigid(view.camera.viewmat.cpu().double())
     rows = torch.from_numpy(missing)
-    nearest = np.asarray(ndimage.distance_transform_edt(~known, return_distances=False, return_indices=True))
+    nearest = _nearest(known)
     carried = None if view.weights is None else view.weights[nearest[0][missing], nearest[1][missing]]
     return _elements(
         none, transform(pose, points[rows]).numpy(), (pose[:3, :3] @ axes[rows]).numpy(),
         FILLING.cover * sizes[rows].clamp_min(1e-6).numpy(), diffuse(straight, known)[missing],
         carried, view.number,
     )  # fmt: skip
+
+
+def _nearest(known: Bool[np.ndarray, "H W"]) -> Integer[np.ndarray, "2 H W"]:
+    """Rows and columns of the nearest known pixels."""
+    return np.asarray(ndimage.distance_transform_edt(~known, return_distances=False, return_indices=True))
 
 
 def _elements(

@@ -31,7 +31,7 @@ from langflash_core.types import Camera, Scene
 from .coarse import coarsen
 from .filling import fill
 from .looks import Progress, Render, mattes
-from .photos import dilate_mask, not_in_scene, painted_over, reaches, with_photos, without_photos
+from .photos import dilate_mask, not_in_scene, painted_over, reaches
 
 How = Literal["blur", "pixels", "remove"]
 
@@ -104,7 +104,8 @@ def hide(
     if not bool(members.any()):
         raise InputError("nothing was chosen to be hidden; name or select something that is there")
     told("looking", 0.1)
-    masks, rows = _mask_views(scene, members, hiding.margin, render)
+    margins, least = _reach_margins(scene, members, render)
+    masks, rows = [each <= hiding.margin for each in margins], least <= hiding.margin
     side = 0.0 if hiding.how == "remove" else _block_side(scene, members, hiding.blocks)
     told("hiding", 0.3)
     kept, names = _remove_names(scene, rows)
@@ -135,14 +136,6 @@ def preview(scene: Scene, members: Tensor, render: Render, margin: float = RECIP
 def least_margins(scene: Scene, members: Tensor, render: Render) -> Tensor:
     """(N,) the margin from which on `hide` changes each Gaussian; infinite where none does, 0 of the part."""
     return _reach_margins(scene, members.cpu(), render)[1]
-
-
-def _mask_views(
-    scene: Scene, members: Tensor, margin: float, render: Render
-) -> tuple[list[np.ndarray], Tensor]:
-    """Masks (H, W) of the part in all views, and (N,) bool of what is hidden with it."""
-    margins, least = _reach_margins(scene, members, render)
-    return [each <= margin for each in margins], least <= margin
 
 
 def _reach_margins(scene: Scene, members: Tensor, render: Render) -> tuple[list[np.ndarray], Tensor]:
@@ -231,7 +224,10 @@ def _with_photos(
 ) -> tuple[Scene, dict[int, float]]:
     """The scene with photos painted over, or without any; and the share of each that was."""
     if not scene.photos or not hiding.photos:
-        return without_photos(scene) if scene.photos else scene, {}
+        return replace(scene, photos=()).with_record(photos=()) if scene.photos else scene, {}
     shares = {view: float(mask.mean()) for view, mask in enumerate(masks) if mask.any()}
-    photos = {view: painted_over(scene, view, masks[view], render) for view in shares}
-    return with_photos(scene, photos), shares
+    photos = (
+        painted_over(scene, view, masks[view], render) if view in shares else photo
+        for view, photo in enumerate(scene.photos)
+    )
+    return replace(scene, photos=tuple(photos)), shares

@@ -8,14 +8,13 @@ Sizes: H W pixels of a view, h w of its photo.
 """
 
 import io
-from dataclasses import replace
 
 import cv2
 import numpy as np
 from jaxtyping import Bool, Float, UInt8
 from PIL import Image
 
-from langflash_core.base.picture_files import STORED, opened_picture
+from langflash_core.base.picture_files import decoded_photo
 from langflash_core.errors import SceneFileError
 from langflash_core.mending.settings import HIDDEN_PHOTOS
 from langflash_core.scene.exposure import lit_camera
@@ -51,10 +50,8 @@ def painted_over(scene: Scene, view: int, mask: Bool[np.ndarray, "H W"], render:
     photo = _decode_photo(scene.photos[view], view)
     height, width = photo.shape[:2]
     covered = cv2.resize(mask.astype(np.float32), (width, height), interpolation=cv2.INTER_LINEAR)
-    covered = (
-        cv2.GaussianBlur((covered > 0).astype(np.float32), (0, 0), width / mask.shape[1])
-        > HIDDEN_PHOTOS.rounded
-    )
+    blurred = cv2.GaussianBlur((covered > 0).astype(np.float32), (0, 0), width / mask.shape[1])
+    covered = blurred > HIDDEN_PHOTOS.rounded
     shown = _render_as_photo(scene, scene.camera(view, width, height), render)
     painted = np.where(covered[..., None], shown, photo)
     stream = io.BytesIO()
@@ -75,24 +72,13 @@ def not_in_scene(scene: Scene, view: int, render: Render) -> Bool[np.ndarray, "H
     return cv2.blur(apart, (HIDDEN_PHOTOS.patch, HIDDEN_PHOTOS.patch)) > HIDDEN_PHOTOS.strange
 
 
-def with_photos(scene: Scene, photos: dict[int, bytes]) -> Scene:
-    """The scene with other photos in some views."""
-    return replace(scene, photos=tuple(photos.get(view, photo) for view, photo in enumerate(scene.photos)))
-
-
-def without_photos(scene: Scene) -> Scene:
-    """The scene without photos and their names."""
-    return replace(scene, photos=()).with_record(photos=())
-
-
 def _decode_photo(photo: bytes, view: int) -> UInt8[np.ndarray, "h w 3"]:
-    try:
-        with opened_picture(photo, STORED) as opened:
-            return np.asarray(opened.convert("RGB"))
-    except (OSError, SyntaxError, ValueError) as error:
+    pixels = decoded_photo(photo)
+    if pixels is None:
         raise SceneFileError(
             f"photo {view + 1} inside the scene is damaged; leave all photos out with --photos none"
-        ) from error
+        )
+    return pixels
 
 
 def _render_as_photo(scene: Scene, camera: Camera, render: Render) -> UInt8[np.ndarray, "h w 3"]:

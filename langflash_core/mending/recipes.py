@@ -66,9 +66,8 @@ class Recipe:
             _check_rule(rule)
         if isinstance(self.crop, str) and self.crop not in PRESETS:
             raise InputError(f"there is no box '{self.crop}'; choose {', '.join(PRESETS)}, or six numbers")
-        if isinstance(self.crop, tuple) and not all(
-            a < b for a, b in zip(self.crop[:3], self.crop[3:], strict=True)
-        ):
+        box = self.crop if isinstance(self.crop, tuple) else (0.0, 0.0, 0.0, 1.0, 1.0, 1.0)
+        if not all(low < high for low, high in zip(box[:3], box[3:], strict=True)):
             raise InputError(
                 "a box's first three numbers are its low corner; each must be below its high one"
             )
@@ -182,11 +181,8 @@ def _check_rule(rule: Rule) -> None:
         numbers: Sequence[Any] = [value for value in values if value is not None]
         if name not in (*MEASURES, COLOUR):
             raise InputError(f"there is no measure '{name}'; choose {', '.join((*MEASURES, COLOUR))}")
-        if (
-            not numbers
-            or len(values) != (4 if name == COLOUR else 2)
-            or (name == COLOUR and len(numbers) < 4)
-        ):
+        whole, least = (4, 4) if name == COLOUR else (2, 1)
+        if len(values) != whole or len(numbers) < least:
             raise InputError(
                 f"the condition on {name} lacks a number; say one as opacity<.1 or colour~#808080:.1"
             )

@@ -48,10 +48,10 @@ def diffuse(values: Float[np.ndarray, "H W n"], known: Bool[np.ndarray, "H W"]) 
     square[: known.shape[0], : known.shape[1], 3] = known
     square[: known.shape[0], : known.shape[1], :3] = np.where(known[..., None], values, 0)
     whole = torch.from_numpy(square)
-    near = fill_gaps(whole[..., :3], whole[..., 3]).numpy()[: known.shape[0], : known.shape[1]]
-    weight = fill_gaps(whole[..., 3:].expand(-1, -1, 3), whole[..., 3]).numpy()[
-        : known.shape[0], : known.shape[1]
-    ]
+    near, weight = (
+        fill_gaps(each, whole[..., 3]).numpy()[: known.shape[0], : known.shape[1]]
+        for each in (whole[..., :3], whole[..., 3:].expand(-1, -1, 3))
+    )
     nearest = ndimage.distance_transform_edt(~known, return_distances=False, return_indices=True)
     fallback = values[tuple(np.asarray(nearest))]
     return np.where(weight > 0.5, near / np.maximum(weight, 1e-6), fallback)

@@ -9,7 +9,7 @@ from jaxtyping import Float, UInt8
 from PIL import Image
 from torch.nn.functional import normalize
 
-from langflash_core.base.picture_files import STORED, opened_picture
+from langflash_core.base.picture_files import decoded_photo
 from langflash_core.geometry.surfels import covered_areas
 from langflash_core.rig.projected import project_points
 from langflash_core.scene.selection import strongest_atoms
@@ -143,12 +143,3 @@ def _crop(photo: np.ndarray, cells: np.ndarray) -> np.ndarray:
     box = (left * right, top * down, (left + side) * right, (top + side) * down)
     size = (ATOM_PICTURES.picture_side, ATOM_PICTURES.picture_side)
     return np.asarray(Image.fromarray(photo).resize(size, Image.Resampling.BILINEAR, box))
-
-
-def decoded_photo(photo: bytes) -> UInt8[np.ndarray, "H W 3"] | None:
-    """A scene's small photo as (H, W, 3) uint8; None where it is damaged."""
-    try:
-        with opened_picture(photo, STORED) as opened:
-            return np.asarray(opened.convert("RGB"))
-    except (OSError, SyntaxError, ValueError):  # a scene whose small photos are damaged still has its words
-        return None

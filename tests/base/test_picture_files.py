@@ -10,10 +10,9 @@ import numpy as np
 import pytest
 from PIL import Image, ImageCms
 
-from langflash_core.base.picture_files import FORMATS, STORED, TooManyPixels, opened_picture
+from langflash_core.base.picture_files import FORMATS, STORED, TooManyPixels, decoded_photo, opened_picture
 from langflash_core.errors import ImageError
 from langflash_core.images.decode import read_photo
-from langflash_core.scene.atoms import decoded_photo
 
 ROOT = Path(__file__).resolve().parents[2]
 # The one place, and the process that decodes HEIC and AVIF.

@@ -8,7 +8,7 @@ import torch
 from PIL import Image
 from torch.nn import functional as F
 
-from langflash_core.base.picture_files import STORED, opened_picture
+from langflash_core.base.picture_files import decoded_photo
 from langflash_core.base.running import Progress
 from langflash_core.inventory.things import Inventory
 from langflash_core.segments import carrying, segmented_view
@@ -31,19 +31,17 @@ def cutouts_of(found: Inventory, renderer: Renderer, progress: Progress) -> dict
             if best[number] == view:
                 picture = _cut_out(photo, seen.mattes[number].cpu())
                 if picture is not None:
-                    cutouts[thing.id] = _url(picture)
+                    stream = io.BytesIO()
+                    picture.save(stream, "WEBP", quality=CUTOUTS.quality)
+                    packed = base64.b64encode(stream.getvalue()).decode()
+                    cutouts[thing.id] = f"data:image/webp;base64,{packed}"
     return cutouts
 
 
 def _photo(found: Inventory, view: int, drawn: torch.Tensor) -> np.ndarray:
     """(H, W, 3) uint8: the photo, or what is drawn of it where the scene has none."""
-    if view < len(found.scene.photos):
-        try:
-            with opened_picture(found.scene.photos[view], STORED) as opened:
-                return np.asarray(opened.convert("RGB"))
-        except (OSError, SyntaxError, ValueError):  # a damaged photo: what was made of it is there
-            pass
-    return (drawn.clamp(0, 1) * 255).round().byte().cpu().numpy()
+    photo = decoded_photo(found.scene.photos[view]) if view < len(found.scene.photos) else None
+    return (drawn.clamp(0, 1) * 255).round().byte().cpu().numpy() if photo is None else photo
 
 
 def _cut_out(photo: np.ndarray, matte: torch.Tensor) -> Image.Image | None:
@@ -56,20 +54,10 @@ def _cut_out(photo: np.ndarray, matte: torch.Tensor) -> Image.Image | None:
     left, top = int(columns.min()), int(rows.min())
     right, bottom = int(columns.max()) + 1, int(rows.max()) + 1
     margin = round(CUTOUTS.margin * max(right - left, bottom - top))
-    box = (
-        max(0, left - margin),
-        max(0, top - margin),
-        min(width, right + margin),
-        min(height, bottom + margin),
-    )
+    low = max(0, left - margin), max(0, top - margin)
+    box = (*low, min(width, right + margin), min(height, bottom + margin))
     soft = ((alpha - 0.25) / 0.5).clamp(0, 1)
     picture = np.dstack((photo, (soft * 255).round().byte().numpy()))
     cut = Image.fromarray(picture, "RGBA").crop(box)
     cut.thumbnail((CUTOUTS.side, CUTOUTS.side), Image.Resampling.LANCZOS)
     return cut
-
-
-def _url(picture: Image.Image) -> str:
-    stream = io.BytesIO()
-    picture.save(stream, "WEBP", quality=CUTOUTS.quality)
-    return f"data:image/webp;base64,{base64.b64encode(stream.getvalue()).decode()}"

@@ -1,12 +1,15 @@
-"""The files of the folder: per view masks, cut-outs and depth; of all together boxes, surfaces, a sheet."""
+"""A folder with every view of a scene taken apart by phrases: per view masks, cut-outs and depth; of all
+together boxes, surfaces, a sheet, and a manifest that says in which unit and axes, and by which command."""
 
 import json
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 from torch import Tensor
 
+from langflash_core import __version__
 from langflash_core.base.files import staged_folder
 from langflash_core.base.request import ExportRequest
 from langflash_core.base.running import Progress
@@ -16,25 +19,31 @@ from langflash_core.export.colours import label_colours
 from langflash_core.export.paint import depth_picture, write_picture
 from langflash_core.export.png import to_8bit, write_grey, write_labels, write_mask, write_rgb
 from langflash_core.export.sheet import contact_sheet, thumbnail
-from langflash_core.types import SegmentedView
-from langflash_core.writing.segmented import manifest
-from langflash_core.writing.subject import Subject, boxes, cut_out, plural, surfaces, views_of
+from langflash_core.types import Camera, SegmentedView
+from langflash_core.writing.job import Job
+from langflash_core.writing.subject import Subject, boxes, cut_out, plural, surfaces, taken_apart, views_of
 
 _GREY = 0.25  # behind phrases on the sheet
 _WIDE = 8  # tiles of a view that fit into a row of their own
 
 
-def write_folder(subject: Subject, request: ExportRequest, progress: Progress) -> str:
-    """All views, boxes, surfaces, contact sheet and manifest, all or none.
-
-    Returns:
-        What was written, in words.
+def write_segmented(job: Job) -> str:
+    """The folder of every photo's view, or of the one that is named.
 
     Raises:
-        LangFlashError: the folder cannot be written.
+        LangFlashError: nothing answers, or the folder cannot be written.
     """
+    cameras = job.cameras()
+    numbers = list(range(len(cameras))) if job.of_photos else [job.choice.view]
+    with job.renderer() as renderer:
+        subject = taken_apart(job.scene, job.prompts, job.request.threshold, cameras, numbers, renderer)
+        return _write_folder(subject, job.request, job.progress)
+
+
+def _write_folder(subject: Subject, request: ExportRequest, progress: Progress) -> str:
+    """All views, boxes, surfaces, contact sheet and manifest, all or none; what was written, in words."""
     with staged_folder(request.output) as staging:
-        places = [staging / manifest.folder_name(number) for number in subject.numbers]
+        places = [staging / _folder_name(number) for number in subject.numbers]
         files, tiles, depths = [], [], []
         for index, view in enumerate(views_of(subject)):
             progress("drawing", 0.9 * index / len(places))
@@ -48,14 +57,12 @@ def write_folder(subject: Subject, request: ExportRequest, progress: Progress) -
         write_picture(staging / "sheet.png", contact_sheet(tiles, a_row if a_row <= _WIDE else None))
         glb.write_boxes(boxes(subject), staging / "boxes.glb")
         missing |= _write_surfaces(staging / "surfaces.glb", subject)
-        document = manifest.document(request, subject, files, step, missing)
+        document = _document(request, subject, files, step, missing)
         text = json.dumps(document, indent=2, ensure_ascii=False, allow_nan=False)
         (staging / "manifest.json").write_text(text, encoding="utf-8")
-    said = [
-        f"{len(subject.found)} of {len(subject.names)} phrases, {plural(len(subject.things), 'instance')}"
-    ]
-    said[0] += f" in {plural(len(places), 'view')}"
-    return "; ".join([*said, *(f"without {name}: {why}" for name, why in missing.items())])
+    said = f"{len(subject.found)} of {len(subject.names)} phrases, {plural(len(subject.things), 'instance')}"
+    said += f" in {plural(len(places), 'view')}"
+    return "; ".join([said, *(f"without {name}: {why}" for name, why in missing.items())])
 
 
 def _write_view(folder: Path, subject: Subject, view: SegmentedView) -> dict[str, Any]:
@@ -127,3 +134,80 @@ def _tiles(subject: Subject, view: SegmentedView, where: str) -> list[tuple[str,
         count = subject.segments.counts[phrase]
         tiles.append((subject.segments.prompts[phrase] + (f" ({count})" if count > 1 else ""), to_8bit(lit)))
     return [(caption, thumbnail(picture)) for caption, picture in tiles]
+
+
+def _folder_name(number: int | None) -> str:
+    """Where a view's files are: of a photo by its number as people count, of a camera that was described
+    without."""
+    return "camera" if number is None else f"photo_{number + 1}"
+
+
+def _document(
+    request: ExportRequest,
+    subject: Subject,
+    files: Sequence[dict[str, Any]],
+    step: float,
+    missing: dict[str, str],
+) -> dict[str, Any]:
+    """The JSON; paths are relative to it.
+
+    Args:
+        files: names by kind, one entry a view. step: of depth.png, in the unit. missing: why, by name.
+    """
+    views = zip(subject.numbers, subject.cameras, files, strict=True)
+    return {
+        "made_by": f"langflash {__version__}",
+        "command": request.line,
+        "scene": str(request.scene),
+        "backend": subject.renderer.backend,
+        "threshold": subject.segments.threshold,
+        "unit": subject.unit,
+        "axes": "x right, y down, z forward; viewmat maps world to camera, K is in pixels",
+        "depth": {
+            "depth.png": f"16 bits; depth = value * {step:g}, 0 is nothing",
+            "depth.exr": "channel Z, 32-bit floats; depth = value, 0 is nothing",
+            "step": step,
+            "along": "z, the viewing direction",
+        },
+        "phrases": _phrases(subject),
+        "views": [_view(subject, *view, "depth.exr" not in missing) for view in views],
+        "files": {
+            kind: name
+            for kind, name in (("sheet", "sheet.png"), ("boxes", "boxes.glb"), ("surfaces", "surfaces.glb"))
+            if name not in missing
+        },
+        "left_out": missing,
+    }
+
+
+def _phrases(subject: Subject) -> list[dict[str, Any]]:
+    """A phrase and its instances, with the numbers that they have in labels.png and instances.png."""
+    parts = subject.segments
+    entries = [
+        {"id": p + 1, "prompt": prompt, "found": bool(count), "score": score, "instances": []}
+        for p, (prompt, count, score) in enumerate(
+            zip(parts.prompts, parts.counts, parts.scores, strict=True)
+        )
+    ]
+    for index, ((phrase, number), (name, box)) in enumerate(zip(parts.things, boxes(subject), strict=True)):
+        gaussians = int((parts.instances[phrase] == number).sum())
+        entry = {"id": index + 1, "name": name, "gaussians": gaussians, "box": box}
+        entries[phrase]["instances"].append(entry)
+    return entries
+
+
+def _view(
+    subject: Subject, number: int | None, camera: Camera, files: dict[str, Any], exr: bool
+) -> dict[str, Any]:
+    photos = subject.scene.record.photos
+    return {
+        "view": None if number is None else number + 1,
+        "photo": photos[number] if number is not None and number < len(photos) else None,
+        "folder": _folder_name(number),
+        "width": camera.width,
+        "height": camera.height,
+        "viewmat": camera.viewmat.tolist(),
+        "K": camera.K.tolist(),
+        "orthographic": camera.orthographic,
+        "files": {**files, **({"depth_exr": "depth.exr"} if exr else {})},
+    }
