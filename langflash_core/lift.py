@@ -24,6 +24,7 @@ from torch import Tensor
 from langflash_core.base.records import Shift
 from langflash_core.errors import Cancelled, InputError
 from langflash_core.export.cameras import read_posed
+from langflash_core.export.png import to_8bit
 from langflash_core.geometry.cameras import invert_rigid
 from langflash_core.geometry.nearness import Nearness
 from langflash_core.geometry.turning import axes_matrix
@@ -74,8 +75,6 @@ class Lifting:
 
 
 LIFTING = Lifting()
-
-
 UP = "-y"  # of the world of a `Scene`
 _TO_DOWN = {"-y": "RDF", "y": "RUB", "z": "RBD", "-z": "RFU", "x": "DLF", "-x": "URF"}  # turns: +y comes down
 UPS = tuple(_TO_DOWN)
@@ -132,7 +131,8 @@ class _Telling:
     cancelled: Callable[[], bool]
 
     def __call__(self, step: str, share: float) -> None:
-        _check(self.cancelled)
+        if self.cancelled():
+            raise Cancelled("the lifting was cancelled; nothing was written")
         self.progress(step, share)
 
 
@@ -154,12 +154,7 @@ class _Looked:
 
 
 def _look_at_views(
-    scene: Scene,
-    cameras: Sequence[Camera],
-    photos: Views | None,
-    draw: Renderer,
-    see: Sees,
-    told: _Telling,
+    scene: Scene, cameras: Sequence[Camera], photos: Views | None, draw: Renderer, see: Sees, told: _Telling
 ) -> _Looked:
     """Draw views, have the network look at them, or at photos from their places, and carry that back."""
     frames = []
@@ -244,14 +239,8 @@ def own_views(frames: Sequence[Frame], cameras: Sequence[Camera]) -> Views:
 
 def _jpeg(image: Tensor) -> bytes:
     stream = io.BytesIO()
-    pixels = (image.permute(1, 2, 0).numpy() * 255).round().astype(np.uint8)
-    Image.fromarray(pixels).save(stream, "JPEG", quality=LIFTING.quality)
+    Image.fromarray(to_8bit(image.permute(1, 2, 0))).save(stream, "JPEG", quality=LIFTING.quality)
     return stream.getvalue()
-
-
-def _check(cancelled: Callable[[], bool]) -> None:
-    if cancelled():
-        raise Cancelled("the lifting was cancelled; nothing was written")
 
 
 def _check_shown(frames: Sequence[Frame]) -> None:
@@ -336,9 +325,7 @@ def _contributions(scene: Scene, camera: Camera, draw: Renderer) -> list[tuple[T
     if chosen is None or not chosen.views or scene.view_ids is None:
         return [(torch.arange(len(scene.gaussians)), torch.ones(camera.height, camera.width))]
     frames = [draw(scene.layer(view), camera) for view in chosen.views]
-    alphas, depths = (
-        torch.stack([getattr(f, name).float() for f in frames]) for name in ("alphas", "depths")
-    )
+    alphas, depths = (torch.stack([getattr(f, n).float() for f in frames]) for n in ("alphas", "depths"))
     rows = [((scene.view_ids == view) | (scene.view_ids < 0)).nonzero()[:, 0] for view in chosen.views]
     return list(zip(rows, shares(alphas.cpu(), depths.cpu(), chosen.weights), strict=True))
 

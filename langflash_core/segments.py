@@ -126,9 +126,8 @@ def segmented_view(scene: Scene, segments: Segments, camera: Camera, render: Ren
     assert maps is not None, "render draws weight maps unless told otherwise"
     count, num_things = len(segments.prompts), len(segments.things)
     mattes, union, parts = maps.movedim(-1, 0).clamp(0, 1).split((count, 1, num_things))
-    view = SegmentedView(
-        camera, replace(frame, weight_maps=None), mattes, union[0], torch.zeros_like(union[0]).long()
-    )
+    none, frame = torch.zeros_like(union[0]).long(), replace(frame, weight_maps=None)
+    view = SegmentedView(camera, frame, mattes, union[0], none)
     if not num_things:
         return view
     phrases = torch.tensor([phrase for phrase, _ in segments.things])
@@ -141,17 +140,11 @@ def carrying(scene: Scene, segments: Segments) -> Scene:
     """The scene with membership for weights: atoms are the phrases, their union, then the things."""
     count = len(segments.prompts)
     union = segments.members.any(0)
-    first = (
-        torch.tensor([0, *segments.counts[:-1]]).cumsum(0) + count + 1
-    )  # atom of each phrase's first thing
+    # The atom of each phrase's first thing.
+    first = torch.tensor([0, *segments.counts[:-1]]).cumsum(0) + count + 1
     numbers = segments.instances.T  # (N, P)
-    ids = torch.cat(
-        (
-            torch.arange(count + 1).expand(len(union), -1),
-            torch.where(numbers > 0, first + numbers - 1, 0),
-        ),
-        1,
-    )
+    parts = torch.where(numbers > 0, first + numbers - 1, 0)
+    ids = torch.cat((torch.arange(count + 1).expand(len(union), -1), parts), 1)
     values = torch.cat((segments.members.T, union[:, None], numbers > 0), 1).float()
     atoms = torch.ones(count + 1 + len(segments.things), 1)
     # names and silences are of the scene's own atoms
@@ -170,16 +163,12 @@ def cut_out(scene: Scene, members: Tensor, camera: Camera, matte: Tensor, render
     Returns:
         (H, W, 4) in [0, 1]; colour is 0 where the matte is.
     """
-    rgb = render(_blacken(scene, ~members), camera, weight_maps=False).rgb
+    sh = torch.where(~members.to(scene.gaussians.sh.device)[:, None, None], 0.0, scene.gaussians.sh)
+    sh[~members, 0] = -1 / SH_C0  # black from everywhere: colour is 0.5 + SH_C0 sh_0, clamped at 0
+    black = replace(scene, gaussians=replace(scene.gaussians, sh=sh))
+    rgb = render(black, camera, weight_maps=False).rgb
     colour = torch.where((matte >= _LEAST)[..., None], rgb / matte.clamp_min(_LEAST)[..., None], 0.0)
     return torch.cat((colour, matte[..., None]), -1).clamp(0, 1)
-
-
-def _blacken(scene: Scene, rows: Tensor) -> Scene:
-    """The scene with some Gaussians black from everywhere: colour is 0.5 + SH_C0 sh_0, clamped at 0."""
-    sh = torch.where(rows.to(scene.gaussians.sh.device)[:, None, None], 0.0, scene.gaussians.sh)
-    sh[rows, 0] = -1 / SH_C0
-    return replace(scene, gaussians=replace(scene.gaussians, sh=sh))
 
 
 def surface(scene: Scene, members: Tensor, cameras: Sequence[Camera], render: Render) -> Surface | None:

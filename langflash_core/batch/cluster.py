@@ -51,7 +51,9 @@ class RayWorkers:
             raise InputError(
                 f"there is no Ray cluster at {address} ({problem}); check --address"
             ) from problem
-        room = _room(ray.cluster_resources(), threads, card)
+        free = ray.cluster_resources()
+        room = int(free.get("CPU", 0) // threads)
+        room = min(room, int(free.get("GPU", 0))) if card else room
         if not room:
             ray.shutdown()
             raise InputError(f"the Ray cluster at {address} has no room for a worker; check --workers")
@@ -74,7 +76,7 @@ class RayWorkers:
     def wait(self, seconds: float) -> list[tuple[Job, Made | Lost]]:
         """What has ended; waits at most so long for the first."""
         ready, _ = self._ray.wait(list(self._jobs), timeout=seconds)
-        return [self._take_result(reference) for reference in ready]
+        return [self._result(reference) for reference in ready]
 
     def close(self) -> None:
         """End all actors, also in the middle of a job, and leave the cluster."""
@@ -84,7 +86,7 @@ class RayWorkers:
         self._jobs.clear()
         self._ray.shutdown()
 
-    def _take_result(self, reference: Any) -> tuple[Job, Made | Lost]:
+    def _result(self, reference: Any) -> tuple[Job, Made | Lost]:
         job, actor = self._jobs.pop(reference)
         try:
             made = self._ray.get(reference)
@@ -113,8 +115,3 @@ def _check_address(address: str) -> None:
         socket.create_connection((host.strip("[]"), int(port)), timeout=_PATIENCE).close()
     except (OSError, OverflowError) as problem:
         raise InputError(f"there is no Ray cluster at {address} ({problem}); check --address") from problem
-
-
-def _room(resources: dict[str, float], threads: int, card: bool) -> int:
-    room = int(resources.get("CPU", 0) // threads)
-    return min(room, int(resources.get("GPU", 0))) if card else room

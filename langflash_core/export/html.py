@@ -187,13 +187,9 @@ def _packed_script(name: str, content: bytes) -> str:
 def _text_scripts(model: TextModel | None) -> str:
     if model is None:
         return ""
-    return "\n".join(
-        (
-            _packed_script("tower", model.weights),
-            _packed_script("tokens", "\n".join(model.tokens).encode()),
-            f"<!--\n{model.licence.replace('--', '- -')}\n-->",
-        )
-    )
+    scripts = {"tower": model.weights, "tokens": "\n".join(model.tokens).encode()}
+    packed = (_packed_script(name, content) for name, content in scripts.items())
+    return "\n".join((*packed, f"<!--\n{model.licence.replace('--', '- -')}\n-->"))
 
 
 def _json_script(name: str, content: dict) -> str:
@@ -205,12 +201,8 @@ def _json_script(name: str, content: dict) -> str:
 def _constants() -> dict[str, str]:
     """What `show.frag` is given, as GLSL."""
     stops = ", ".join("vec3({})".format(", ".join(f"{part:.3f}" for part in stop)) for stop in HEAT_STOPS)
-    return {
-        "GLOW": str(PAINTING.glow),
-        "DIM": str(PAINTING.dim),
-        "STOPS": str(len(HEAT_STOPS)),
-        "HEAT_STOPS": stops,
-    }
+    shares = {"GLOW": str(PAINTING.glow), "DIM": str(PAINTING.dim)}
+    return {**shares, "STOPS": str(len(HEAT_STOPS)), "HEAT_STOPS": stops}
 
 
 def _encode(scene: Scene, phrases: Phrases | None) -> tuple[dict, bytes]:
@@ -218,7 +210,7 @@ def _encode(scene: Scene, phrases: Phrases | None) -> tuple[dict, bytes]:
     origin = invert_rigid(scene.viewmats[0].double())[:3, 3]
     if scene.view_ids is None:  # in no order that says what is near
         scene = scene.rows(torch.from_numpy(morton_order(scene.gaussians.means.double().cpu().numpy())))
-    held, books, columns = _page_columns(scene, origin)
+    world, (held, books, columns) = scene.record.world, _page_columns(scene, origin)
     header = {
         "format": _FORMAT,
         "version": _VERSION,
@@ -226,7 +218,8 @@ def _encode(scene: Scene, phrases: Phrases | None) -> tuple[dict, bytes]:
         "origin": origin.tolist(),
         "views": _views(scene, origin),
         "viewSize": list(scene.view_size),
-        "down": _down(scene),
+        # As the world has it that the scene stands in, else as the first photo was held.
+        "down": (scene.viewmats[0, 1, :3] if world is None else turn_of(world)[1]).tolist(),
         **_light(scene),
         **_tour(scene, origin.numpy()),
         **books,
@@ -260,15 +253,9 @@ def _views(scene: Scene, origin: Tensor) -> list[dict]:
     """Each photo's camera: rows of its rotation, its place from the origin, fx, fy, cx, cy in pixels."""
     views = []
     for viewmat, K in zip(scene.viewmats.double(), scene.Ks.double(), strict=True):
-        place = invert_rigid(viewmat)[:3, 3] - origin
-        pinhole = [K[0, 0], K[1, 1], K[0, 2], K[1, 2]]
-        views.append(
-            {
-                "turn": viewmat[:3, :3].tolist(),
-                "eye": place.tolist(),
-                "pinhole": [float(value) for value in pinhole],
-            }
-        )
+        eye = (invert_rigid(viewmat)[:3, 3] - origin).tolist()
+        pinhole = [float(value) for value in (K[0, 0], K[1, 1], K[0, 2], K[1, 2])]
+        views.append({"turn": viewmat[:3, :3].tolist(), "eye": eye, "pinhole": pinhole})
     return views
 
 
@@ -277,12 +264,6 @@ def _light(scene: Scene) -> dict:
     light = scene.record.light
     told = {**light, "distance": median_distance(scene), "far": EXPOSURE.far, "here": EXPOSURE.here}
     return {"light": told} if light else {}
-
-
-def _down(scene: Scene) -> list[float]:
-    """Where down is: as the world has it that the scene stands in, else as the first photo was held."""
-    world = scene.record.world
-    return (scene.viewmats[0, 1, :3] if world is None else turn_of(world)[1]).tolist()
 
 
 def _tour(scene: Scene, origin: np.ndarray) -> dict:

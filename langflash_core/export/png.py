@@ -61,12 +61,7 @@ def write_relevance(path: Path, relevance: Tensor, mode: str) -> None:
 
 
 def write_heat(
-    path: Path,
-    relevance: Tensor,
-    rgb: Tensor,
-    threshold: float,
-    mode: str,
-    colours: HeatColours = USUAL,
+    path: Path, relevance: Tensor, rgb: Tensor, threshold: float, mode: str, colours: HeatColours = USUAL
 ) -> None:
     """Relevance glowing over the view (`heat_over`)."""
     write_rgb(path, heat_over(relevance, rgb, threshold, mode, colours))
@@ -123,14 +118,10 @@ def write_labels(path: Path, labels: Tensor, names: Sequence[str]) -> None:
     image = Image.fromarray(labels.cpu().numpy().astype(np.uint8))
     image.putpalette(colours.flatten().tolist())
     counts = torch.bincount(labels.flatten().long().cpu(), minlength=len(names) + 1)
+    shares = [float(count) / max(1, labels.numel()) for count in counts]
     entries = [
-        {
-            "id": index,
-            "label": name,
-            "colour": "#" + bytes(colours[index].tolist()).hex(),
-            "area": float(counts[index]) / max(1, labels.numel()),
-        }
-        for index, name in enumerate(["", *names])
+        {"id": index, "label": name, "colour": "#" + bytes(colours[index].tolist()).hex(), "area": share}
+        for index, (name, share) in enumerate(zip(["", *names], shares, strict=True))
     ]
     legend = json.dumps({"picture": path.name, "labels": entries}, indent=2, ensure_ascii=False)
     write_atomically(path.with_suffix(".json"), legend.encode())
@@ -165,9 +156,8 @@ def label_picture(result: QueryResult) -> np.ndarray:
     colours = np.concatenate((np.zeros((1, 3)), label_colours(len(result.answers)) / 255))
     frame = result.frame
     rgb = fill_gaps(frame.rgb.detach().cpu().float(), frame.alphas.detach().cpu().float()).clamp(0, 1)
-    coloured = (1 - PAINTING.label_opacity) * rgb + PAINTING.label_opacity * torch.from_numpy(
-        colours
-    ).float()[labels]
+    painted = torch.from_numpy(colours).float()[labels]
+    coloured = (1 - PAINTING.label_opacity) * rgb + PAINTING.label_opacity * painted
     return to_8bit(torch.where((labels > 0)[..., None], coloured, 0.4 * rgb))
 
 

@@ -96,13 +96,7 @@ def _check_memory(most: int, num_bases: int, name: str) -> None:
 
 
 def to_scene(
-    gathering: Gathering,
-    name: str,
-    warnings: list[str],
-    *,
-    logs: bool,
-    logits: bool,
-    model: str = PLAIN,
+    gathering: Gathering, name: str, warnings: list[str], *, logs: bool, logits: bool, model: str = PLAIN
 ) -> Scene:
     """The scene of gathered rows, activated in place.
 

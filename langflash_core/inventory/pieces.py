@@ -114,10 +114,7 @@ class Pieces:
     """
 
     def __init__(
-        self,
-        masses: Float[np.ndarray, " n"],
-        means: Float[np.ndarray, "n G"],
-        near: list[dict[int, float]],
+        self, masses: Float[np.ndarray, " n"], means: Float[np.ndarray, "n G"], near: list[dict[int, float]]
     ):
         self.masses, self.means, self.near = masses.copy(), means.copy(), near
         self._into = np.arange(len(masses))

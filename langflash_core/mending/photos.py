@@ -16,6 +16,7 @@ from PIL import Image
 
 from langflash_core.base.picture_files import decoded_photo
 from langflash_core.errors import SceneFileError
+from langflash_core.export.png import to_8bit
 from langflash_core.mending.settings import HIDDEN_PHOTOS
 from langflash_core.scene.exposure import lit_camera
 from langflash_core.scene.gaps import fill_gaps
@@ -85,4 +86,4 @@ def _render_as_photo(scene: Scene, camera: Camera, render: Render) -> UInt8[np.n
     """A view as its photo has it, in that one's light, its gaps filled by what is around them."""
     frame = render(scene, lit_camera(scene, camera), weight_maps=False)
     shown = fill_gaps(frame.rgb.cpu().float(), frame.alphas.cpu().float())
-    return (shown.clamp(0, 1) * 255).round().byte().numpy()
+    return to_8bit(shown)

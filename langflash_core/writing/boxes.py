@@ -60,7 +60,9 @@ def write_rows(path: Path, rows: Sequence[dict[str, Any]]) -> None:
     """
     make_folder(path.parent)
     if path.suffix.lower() == ".glb":
-        return glb.write_boxes([(_node(row), row["box"]) for row in rows if row["box"]], path)
+        photo = {row["view"]: f" (photo {row['view']})" if row["view"] else "" for row in rows}
+        found = [(row["prompt"] + photo[row["view"]], row["box"]) for row in rows if row["box"]]
+        return glb.write_boxes(found, path)
     if path.suffix.lower() == ".json":
         content = json.dumps(rows, indent=2, ensure_ascii=False, allow_nan=False)
     else:
@@ -70,10 +72,6 @@ def write_rows(path: Path, rows: Sequence[dict[str, Any]]) -> None:
         table.writerows(_flat(row) for row in rows)
         content = stream.getvalue()
     write_atomically(path, content.encode())
-
-
-def _node(row: dict[str, Any]) -> str:
-    return row["prompt"] if row["view"] is None else f"{row['prompt']} (photo {row['view']})"
 
 
 def _flat(row: dict[str, Any]) -> dict[str, Any]:

@@ -61,9 +61,9 @@ class CameraChoice:
             ViewError: the scene has no such view.
         """
         if not 0 <= view < scene.num_views:
+            last = f" to {scene.num_views}" if scene.num_views > 1 else ""
             raise ViewError(
-                f"there is no photo {view + 1}: this scene has {scene.num_views}; "
-                f"use --view 1{_last(scene.num_views)}"
+                f"there is no photo {view + 1}: this scene has {scene.num_views}; use --view 1{last}"
             )
         size = self.size or (kept_size(scene, view) if self.full else scene.view_size)
         return lit_camera(scene, self._by_rays(scene.camera(view, *size), scene))
@@ -150,12 +150,8 @@ def camera_of(fields: Any, path: str) -> Camera:
 
 
 def _matrix(rows: Any, side: int) -> Matrix:
-    shaped = (
-        isinstance(rows, list)
-        and len(rows) == side
-        and all(isinstance(row, list) and len(row) == side for row in rows)
-    )
-    if not shaped:
+    lists = [rows, *rows] if isinstance(rows, list) else [rows]
+    if len(lists) != side + 1 or not all(isinstance(each, list) and len(each) == side for each in lists):
         raise ValueError(f"expected {side} rows of {side} numbers")
     try:
         matrix = torch.tensor([[float(value) for value in row] for row in rows]).tolist()
@@ -167,22 +163,15 @@ def _matrix(rows: Any, side: int) -> Matrix:
 
 
 def _size_problem(width: Any, height: Any) -> str | None:
-    for side in (width, height):
-        if isinstance(side, bool) or not isinstance(side, int) or not 1 <= side <= LARGEST_SIDE:
-            return (
-                f"width and height must be whole numbers from 1 to {LARGEST_SIDE}, not {width} and {height}"
-            )
-    return None
+    whole = all(isinstance(side, int) and not isinstance(side, bool) for side in (width, height))
+    if whole and min(width, height) >= 1 and max(width, height) <= LARGEST_SIDE:
+        return None
+    return f"width and height must be whole numbers from 1 to {LARGEST_SIDE}, not {width} and {height}"
 
 
 def _pose_problem(viewmat: Matrix) -> str | None:
-    rotation = [row[:3] for row in viewmat[:3]]
-    products = [
-        abs(sum(a * b for a, b in zip(rotation[i], rotation[j], strict=True)) - (i == j))
-        for i in range(3)
-        for j in range(3)
-    ]
-    if max(products) > RIGID_TOLERANCE or _determinant(rotation) < 0:
+    rotation = np.array(viewmat)[:3, :3]
+    if abs(rotation @ rotation.T - np.eye(3)).max() > RIGID_TOLERANCE or np.linalg.det(rotation) < 0:
         return "viewmat's upper left 3 x 3 must be a rotation, without scale or mirror"
     if viewmat[3] != [0.0, 0.0, 0.0, 1.0]:
         return "viewmat's last row must be 0 0 0 1"
@@ -195,15 +184,3 @@ def _pinhole_problem(K: Matrix) -> str | None:
     if K[0][1] or K[1][0] or K[2] != [0.0, 0.0, 1.0]:
         return "K must be [[fx, 0, cx], [0, fy, cy], [0, 0, 1]], without skew"
     return None
-
-
-def _determinant(m: Matrix) -> float:
-    return (
-        m[0][0] * (m[1][1] * m[2][2] - m[1][2] * m[2][1])
-        - m[0][1] * (m[1][0] * m[2][2] - m[1][2] * m[2][0])
-        + m[0][2] * (m[1][0] * m[2][1] - m[1][1] * m[2][0])
-    )
-
-
-def _last(num_views: int) -> str:
-    return f" to {num_views}" if num_views > 1 else ""

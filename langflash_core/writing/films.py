@@ -99,30 +99,27 @@ def way(
         ViewError: the key frames cannot be used, or the scene has no tour.
     """
     if path == "tour":
-        size = even(size or scene.view_size)
-        return [to_camera(pose, *size) for pose in along_stops(_stops(scene), seconds)]
+        stops, size = read_tour(scene.record.tour).stops, even(size or scene.view_size)
+        if not stops:
+            raise ViewError(
+                'the scene has no tour; give it stops with: langflash tour stop SCENE "The window"'
+            )
+        return [to_camera(pose, *size) for pose in along_stops([stop.pose for stop in stops], seconds)]
     if path in (None, "photos", "orbit"):
         width, height = even(size or scene.view_size)
         views = _poses(scene)
         around = _turn(views[0], shown) if path == "orbit" else None
         count = max(1, round(RATE * (seconds or FILMING.seconds)))
-        turns, up = _turns(scene), _up(scene)
-        poses = [
-            orbit(around, 2 * math.pi * index / count, 0.0, up)
-            if around
-            else _at(views, index / count, turns, up)
-            for index in range(count)
-        ]
-        return [to_camera(pose, width, height) for pose in poses]
+        # A splat file's that is looked at from outside can be walked around.
+        at_origin = torch.equal(scene.viewmats[0].cpu(), torch.eye(4))
+        turns, up = scene.semantics.space == NO_LANGUAGE and not at_origin, _up(scene)
+
+        def pose(index: int) -> Pose:
+            angle = 2 * math.pi * index / count
+            return orbit(around, angle, 0.0, up) if around else _at(views, index / count, turns, up)
+
+        return [to_camera(pose(index), width, height) for index in range(count)]
     return along(*read_key_frames(Path(path), seconds), size)
-
-
-def _stops(scene: Scene) -> list[Pose]:
-    """Raises ViewError: the scene has none."""
-    stops = read_tour(scene.record.tour).stops
-    if not stops:
-        raise ViewError('the scene has no tour; give it stops with: langflash tour stop SCENE "The window"')
-    return [stop.pose for stop in stops]
 
 
 def along_stops(stops: Sequence[Pose], seconds: float | None) -> list[Pose]:
@@ -182,12 +179,6 @@ def _poses(scene: Scene) -> list[Pose]:
     return [from_view(V, K, scene.view_size, median_reach(means, V, K, scene.view_size)) for V, K in pairs]
 
 
-def _turns(scene: Scene) -> bool:
-    """Whether the scene can be walked around: a splat file's that is looked at from outside."""
-    at_origin = torch.equal(scene.viewmats[0].cpu(), torch.eye(4))
-    return scene.semantics.space == NO_LANGUAGE and not at_origin
-
-
 def _turn(view: Pose, shown: Scene) -> Pose:
     """Where an orbit begins: as the first view looks, far enough away to show all that is drawn."""
     means = shown.gaussians.means.detach().double().cpu().numpy()
@@ -204,11 +195,8 @@ def _at(views: list[Pose], time: float, turns: bool, up: Float[np.ndarray, "3"])
     """The pose at `time` in [0, 1) of the round."""
     if len(views) == 1:
         angle = 2 * math.pi * time
-        if turns:
-            return orbit(views[0], angle, 0.0, up)
-        return orbit(
-            views[0], FILMING.sway[0] * math.sin(angle), FILMING.sway[1] * (1 - math.cos(angle)) / 2, up
-        )
+        sway = FILMING.sway[0] * math.sin(angle), FILMING.sway[1] * (1 - math.cos(angle)) / 2
+        return orbit(views[0], *((angle, 0.0) if turns else sway), up)
     leg, fraction = divmod(time * len(views), 1.0)
     return blend(views[int(leg)], views[(int(leg) + 1) % len(views)], fraction)
 
@@ -233,14 +221,11 @@ def read_key_frames(path: Path, seconds: float | None) -> tuple[list[Camera], li
     times = [entry.get("time") for entry in entries]
     if all(time is None for time in times):
         return cameras, np.linspace(0, seconds or FILMING.seconds, len(cameras)).tolist()
-    numbers = [
-        t for t in times if isinstance(t, int | float) and not isinstance(t, bool) and math.isfinite(t)
-    ]
+    numbers = [t for t in times if type(t) in (int, float) and math.isfinite(t)]
     rising = len(numbers) == len(times) and all(a < b for a, b in itertools.pairwise(numbers))
     if not rising or numbers[-1] - numbers[0] > FILMING.longest:
-        raise ViewError(
-            f"{path}: times must rise, all of them given, over at most {FILMING.longest:g} seconds"
-        )
+        longest = f"over at most {FILMING.longest:g} seconds"
+        raise ViewError(f"{path}: times must rise, all of them given, {longest}")
     if seconds is not None:
         raise ViewError(f"{path} says its times; leave --seconds out")
     return cameras, [number - numbers[0] for number in numbers]

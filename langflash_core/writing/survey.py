@@ -14,19 +14,18 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
-from jaxtyping import Float
 from PIL import Image
-from torch import Tensor
 
 from langflash_core.base.colormaps import HeatColours
 from langflash_core.base.files import make_folder, write_atomically
 from langflash_core.errors import InputError
 from langflash_core.export.answers import answer_fields, file_names
-from langflash_core.export.png import USUAL, heat_over
+from langflash_core.export.png import USUAL, heat_over, to_8bit
 from langflash_core.language.relevance import Mode
 from langflash_core.pipeline import query
 from langflash_core.types import Camera, Frame, PromptAnswer, QueryResult, Scene
 from langflash_core.writing.job import kept_of
+from langflash_core.writing.subject import plural
 
 MOST_VIEWS = 4
 """Of a scene, evenly among its photos: each takes as long as a query."""
@@ -92,7 +91,9 @@ def ask_scene(
         view, result = best[place]
         answer, picture = kept_of(result)[place], f"{PICTURES}/{own}.jpg"
         shown = heat_over(result.relevance[place], result.frame.rgb, answer.threshold, result.mode, colours)
-        _write_picture(folder / picture, shown)
+        stream = io.BytesIO()
+        Image.fromarray(to_8bit(shown)).save(stream, "JPEG", quality=88)
+        write_atomically(folder / picture, stream.getvalue())
         photos = scene.record.photos
         photo = photos[view] if view < len(photos) else ""
         replies.append(Reply(name, answer, view, photo, scene.record.metric_scale, picture))
@@ -123,13 +124,6 @@ def write_survey(
     write_atomically(folder / TABLE, _table(phrases).encode())
     write_atomically(folder / PAGE, "".join(_page(phrases, left_out)).encode())
     return document
-
-
-def _write_picture(path: Path, rgb: Float[Tensor, "H W 3"]) -> None:
-    stream = io.BytesIO()
-    pixels = (rgb.clamp(0, 1) * 255).round().byte().cpu().numpy()
-    Image.fromarray(pixels).save(stream, "JPEG", quality=88)
-    write_atomically(path, stream.getvalue())
 
 
 def _rank(answer: PromptAnswer) -> tuple[bool, float]:
@@ -182,7 +176,7 @@ small {{ display: block; opacity: .75; }}
 
 def _page(phrases: dict[str, list[Reply]], left_out: Sequence[tuple[str, str]]) -> Iterator[str]:
     scenes = len({one.scene for found in phrases.values() for one in found})
-    yield _HEAD.format(title=f"{_count(len(phrases), 'phrase')}, {_count(scenes, 'scene')}")
+    yield _HEAD.format(title=f"{plural(len(phrases), 'phrase')}, {plural(scenes, 'scene')}")
     for prompt, found in phrases.items():
         there = sum(one.answer.found for one in found)
         yield f"<h2>{escape(prompt)}: found in {there} of {len(found)}</h2><ul>\n"
@@ -211,7 +205,3 @@ def _card(one: Reply) -> str:
         f'<span class="sure" title="score, from {answer.threshold:.2f} on found">{answer.score:.2f}</span>'
         f"{escape(one.scene)}<small>{escape(', '.join(words))}</small></li>\n"
     )
-
-
-def _count(number: int, what: str) -> str:
-    return f"{number} {what}{'' if number == 1 else 's'}"

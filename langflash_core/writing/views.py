@@ -3,8 +3,6 @@
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 
-import numpy as np
-
 from langflash_core.base.files import make_folder, staged_folder
 from langflash_core.base.outputs import LABELS, MASK
 from langflash_core.export import depth
@@ -73,7 +71,7 @@ def write_depth(job: Job) -> str:
     cameras = job.cameras()
     targets = job.targets(cameras)
     metres = job.scene.record.metric_scale
-    unit, maps = depth.unit_name(metres), []
+    unit, maps, exr = depth.unit_name(metres), [], job.request.output.suffix.lower() == ".exr"
     with job.renderer() as renderer:
         for index, camera in enumerate(cameras):
             job.progress("drawing", index / len(cameras))
@@ -82,21 +80,13 @@ def write_depth(job: Job) -> str:
     step = depth.fitting_step(longest)
     with staged_folder(job.request.output.parent) as staging:
         for lengths, target in zip(maps, targets, strict=True):
-            _write_lengths(staging / target.name, lengths, step, unit)
+            if exr:
+                depth.write_depth_exr(staging / target.name, lengths, unit)
+            else:
+                depth.write_depth_png(staging / target.name, lengths, step, unit)
     size, units = f"{cameras[0].width} x {cameras[0].height}", "m" if unit == "m" else "scene units"
-    scale = units if _is_exr(job.request.output) else f"depth = value * {step:g} {units}"
+    scale = units if exr else f"depth = value * {step:g} {units}"
     return f"{size}, {scale}, at most {longest:.3g}"
-
-
-def _is_exr(path: Path) -> bool:
-    return path.suffix.lower() == ".exr"
-
-
-def _write_lengths(path: Path, lengths: np.ndarray, step: float, unit: str) -> None:
-    if _is_exr(path):
-        depth.write_depth_exr(path, lengths, unit)
-    else:
-        depth.write_depth_png(path, lengths, step, unit)
 
 
 def write_numbers(job: Job) -> str:

@@ -10,6 +10,7 @@ from torch.nn import functional as F
 
 from langflash_core.base.picture_files import decoded_photo
 from langflash_core.base.running import Progress
+from langflash_core.export.png import to_8bit
 from langflash_core.inventory.things import Inventory
 from langflash_core.segments import carrying, segmented_view
 from langflash_core.writing.renderers import Renderer
@@ -41,7 +42,7 @@ def cutouts_of(found: Inventory, renderer: Renderer, progress: Progress) -> dict
 def _photo(found: Inventory, view: int, drawn: torch.Tensor) -> np.ndarray:
     """(H, W, 3) uint8: the photo, or what is drawn of it where the scene has none."""
     photo = decoded_photo(found.scene.photos[view]) if view < len(found.scene.photos) else None
-    return (drawn.clamp(0, 1) * 255).round().byte().cpu().numpy() if photo is None else photo
+    return to_8bit(drawn) if photo is None else photo
 
 
 def _cut_out(photo: np.ndarray, matte: torch.Tensor) -> Image.Image | None:

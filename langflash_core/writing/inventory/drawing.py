@@ -60,6 +60,7 @@ def plan_svg(plan: Plan, title: str, *, headed: bool = True) -> str:
     )
     per = 1000 / ratio if plan.unit == "m" else min(PAPER.room[0] / wide, PAPER.room[1] / high)
     paper = _Paper(per, west, north)
+    largest_first = sorted(plan.things, key=lambda thing: -thing.size[0] * thing.size[1])
     listed = [*plan.things, *(opening.thing for opening in plan.openings)]
     width = 2 * PAPER.edge + wide * per + (PAPER.list if listed else 0)
     height = PAPER.top + max(2 * PAPER.edge + high * per + 10, PAPER.edge + 6 + PAPER.row * len(listed))
@@ -74,7 +75,7 @@ def plan_svg(plan: Plan, title: str, *, headed: bool = True) -> str:
         f'<text class="title" x="{PAPER.edge}" y="12">{escape(title)}</text>' if headed else "",
         f'<text class="note" x="{PAPER.edge}" y="17">Floor plan, {said}. '
         f"{escape(scale_note(plan.guess, plan.unit))}</text>",
-        *(_thing(paper, thing, doubt_of(thing, plan)) for thing in sorted(plan.things, key=_area)),
+        *(_thing(paper, thing, doubt_of(thing, plan)) for thing in largest_first),
         *(_wall(paper, wall) for wall in plan.walls),
         *(_opening(paper, opening, plan) for opening in plan.openings),
         *(_badge(number + 1, place) for number, place in enumerate(_place_badges(paper, plan.things))),
@@ -93,11 +94,6 @@ def _wall(paper: _Paper, wall: PlanWall) -> str:
     """A line; grey and dashed, with the reason, where it may be none."""
     line = _drawn_line("doubt" if wall.doubt else "wall", paper.at(wall.start), paper.at(wall.end))
     return f"<g><title>Perhaps no wall: {wall.doubt}</title>{line}</g>" if wall.doubt else line
-
-
-def _area(thing: Thing) -> float:
-    """The largest are drawn first."""
-    return -thing.size[0] * thing.size[1]
 
 
 def _thing(paper: _Paper, thing: Thing, doubt: str) -> str:

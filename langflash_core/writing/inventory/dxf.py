@@ -54,15 +54,8 @@ def _line(layer: str, start: Place, end: Place) -> list[tuple[int, object]]:
 
 
 def _outline(layer: str, corners: Sequence[Place]) -> list[tuple[int, object]]:
-    pairs: list[tuple[int, object]] = [
-        (0, "POLYLINE"),
-        (8, layer),
-        (66, 1),
-        (70, 1),
-        (10, 0.0),
-        (20, 0.0),
-        (30, 0.0),
-    ]
+    pairs: list[tuple[int, object]] = [(0, "POLYLINE"), (8, layer), (66, 1), (70, 1)]
+    pairs += [(10, 0.0), (20, 0.0), (30, 0.0)]
     for east, north in corners:
         pairs += [(0, "VERTEX"), (8, layer), (10, east), (20, north), (30, 0.0)]
     return [*pairs, (0, "SEQEND"), (8, layer)]

@@ -57,7 +57,7 @@ def page_of(found: Inventory, plan: Plan, cutouts: Mapping[str, str], title: str
     numbers = {thing.id: number + 1 for number, thing in enumerate(plan.things)}
     rows = "".join(
         _row(thing, numbers.get(thing.id), cutouts.get(thing.id), found, doubt_of(thing, plan))
-        for thing in _order_things(found, plan)
+        for thing in (*plan.things, *(thing for thing in found.things if thing not in plan.things))
     )
     return (
         _HEAD.format(title=escape(title))
@@ -72,11 +72,6 @@ def page_of(found: Inventory, plan: Plan, cutouts: Mapping[str, str], title: str
     )
 
 
-def _order_things(found: Inventory, plan: Plan) -> list[Thing]:
-    """As the plan numbers them, then what is in walls."""
-    return [*plan.things, *(thing for thing in found.things if thing not in plan.things)]
-
-
 def _row(thing: Thing, number: int | None, cutout: str | None, found: Inventory, doubt: str) -> str:
     picture = f'<img alt="{escape(thing.title)}" src="{cutout}">' if cutout else ""
     own = f"<small>{escape(thing.id)}</small>" if thing.name else ""
@@ -85,9 +80,8 @@ def _row(thing: Thing, number: int | None, cutout: str | None, found: Inventory,
     east, _, north = thing.place
     sides = ("east" if east >= 0 else "west"), ("north" if north >= 0 else "south")
     where = f"{length(abs(east), found.unit)} {sides[0]}, {length(abs(north), found.unit)} {sides[1]}"
-    above = (
-        f"<small>{length(thing.bottom, found.unit)} above the floor</small>" if thing.bottom > 0.15 else ""
-    )
+    high = f"<small>{length(thing.bottom, found.unit)} above the floor</small>"
+    above = high if thing.bottom > 0.15 else ""
     return (
         f'<tr><td class="number">{number or ""}</td><td class="picture">{picture}</td>'
         f"<td>{escape(thing.title)}{own}{maybe}</td>"
