@@ -109,6 +109,11 @@ def damaged_files() -> dict[str, tuple[bytes, str]]:
         "more rows than said": (ply_bytes(columns, count=49), "damaged"),
         "fewer rows than said": (ply_bytes(columns, count=51), "cut off"),
         "an absurd count": (ply_bytes(columns, count=10**15), "cut off"),
+        # `int` has a limit of its own, and another error.
+        "a count of thousands of digits": (
+            good.replace(b"vertex 50", b"vertex " + b"9" * 5000),
+            "header line",
+        ),
         "a negative count": (good.replace(b"vertex 50", b"vertex -5"), "header line"),
         "ascii": (b"ply\nformat ascii 1.0\nelement vertex 1\nproperty float x\nend_header\n0\n", "ascii"),
         "a missing property": (ply_bytes(incomplete), "rot_3"),

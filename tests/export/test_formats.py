@@ -199,7 +199,9 @@ def test_every_version_of_spz_makes_the_round_trip(tmp_path, version):
     assert torch.allclose(after.means, gaussians.means, atol=1e-5)
 
 
-@pytest.mark.parametrize("kind", [k for k in SCENES_OUT if k not in (".langflash", ".ply", ".splat")])
+@pytest.mark.parametrize(
+    "kind", [".html", *(k for k in SCENES_OUT if k not in (".langflash", ".ply", ".splat"))]
+)
 def test_an_empty_scene_is_refused_and_nothing_written(tmp_path, kind):
     if kind.startswith(".usd"):
         pytest.importorskip("pxr")

@@ -11,7 +11,7 @@ import torch
 
 from langflash_core import pipeline
 from langflash_core.base.resources import asset_path
-from langflash_core.errors import InputError, OutputError, PromptError
+from langflash_core.errors import InputError, PromptError
 from langflash_core.export import export
 from langflash_core.export.html import LAYERED, READING, SCRIPTS, Phrases, write_html
 from langflash_core.export.settings import COLUMNS
@@ -110,29 +110,6 @@ def test_splats_of_other_programs_are_stored_along_a_curve(tmp_path):
     means = (read_page(tmp_path / "a.html").gaussians().means, scene.gaussians.means)
     ordered, plain = (float(each.diff(dim=0).norm(dim=-1).mean()) for each in means)
     assert ordered < 0.5 * plain
-
-
-def test_an_empty_scene_is_refused_and_nothing_written(tmp_path):
-    nothing = bare_scene(random_gaussians(1), "made").rows(torch.zeros(1, dtype=torch.bool))
-    with pytest.raises(OutputError, match="no Gaussians"):
-        export(nothing, tmp_path / "a.html")
-    assert not os.listdir(tmp_path)
-
-
-def test_an_old_page_stays_whole_where_the_new_one_cannot_be_written(tmp_path, monkeypatch):
-    scene = bare_scene(random_gaussians(3), "made")
-    path = tmp_path / "a.html"
-    path.write_text("old")
-
-    def full(*_):
-        raise OSError(28, "No space left on device")
-
-    monkeypatch.setattr(os, "fsync", full)
-    with pytest.raises(OutputError, match="No space left"):
-        write_html(scene, path)
-    assert path.read_text() == "old" and os.listdir(tmp_path) == ["a.html"]
-    with pytest.raises(OutputError, match="does not exist"):
-        write_html(scene, tmp_path / "nowhere" / "a.html")
 
 
 def test_names_may_hold_anything(tmp_path):

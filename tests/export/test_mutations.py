@@ -14,7 +14,7 @@ from PIL import Image
 
 from langflash_core.errors import SceneFileError
 from langflash_core.export import read
-from tests.export.additions import ADDITIONS, additions, axes_file, files_to_add_to, ply_of, spz_axes
+from tests.export.additions import ADDITIONS, additions, axes_file, files_to_add_to, ply_of
 from tests.export.additions import outcome as outcome_of_addition
 from tests.export.mutations import whole_files
 
@@ -209,19 +209,6 @@ def test_axes_behind_a_large_extension_are_found(addable, tmp_path):
     for bad in (struct.pack("<II", 7, 2**31) + axes, struct.pack("<II", 7, 2**21) + bytes(2**21) + axes):
         (tmp_path / "a.spz").write_bytes(gzip.compress(plain[:-12] + bad, 1))
         assert "extension 0x7 of 2" in refused(tmp_path / "a.spz")[0]
-
-
-def test_axes_that_no_version_names_are_refused(files, tmp_path):
-    seen = set()
-    for seed in range(12):
-        content, word = spz_axes(files["three.spz"], np.random.default_rng(seed))
-        (tmp_path / "a.spz").write_bytes(content)
-        seen.add(word)
-        if word == "axes 0":  # unspecified
-            assert len(read(tmp_path / "a.spz").gaussians) == 60
-        else:
-            assert f"names {word}" in refused(tmp_path / "a.spz")[0]
-    assert len(seen) == 4
 
 
 def test_an_element_twice_is_refused(files, tmp_path):

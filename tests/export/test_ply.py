@@ -8,7 +8,6 @@ import torch
 import trimesh
 
 from langflash_core.base.files import write_atomically
-from langflash_core.errors import SceneFileError
 from langflash_core.export import export, read
 from langflash_core.export.settings import STORED
 from langflash_core.scene.bare import bare_scene
@@ -159,13 +158,3 @@ def test_what_stops_the_writing_leaves_the_old_file(tmp_path):
     with pytest.raises(KeyboardInterrupt):
         write_atomically(tmp_path / "a.ply", parts())
     assert [(path.name, path.read_bytes()) for path in tmp_path.iterdir()] == [("a.ply", b"old")]
-
-
-def test_a_count_of_thousands_of_digits_is_refused_in_a_sentence(tmp_path):
-    """`int` has a limit of its own, and another error."""
-    path = tmp_path / "a.ply"
-    path.write_bytes(
-        b"ply\nformat binary_little_endian 1.0\nelement vertex " + b"9" * 5000 + b"\nend_header\n"
-    )
-    with pytest.raises(SceneFileError, match="has a header line 'element vertex 999"):
-        read(path)

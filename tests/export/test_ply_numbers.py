@@ -2,7 +2,6 @@
 
 import io
 import json
-from contextlib import redirect_stdout
 from dataclasses import replace
 
 import numpy as np
@@ -297,16 +296,3 @@ def test_a_shift_that_is_no_number_is_refused_in_scene_files(tmp_path):
     for wrong in ([1.0, 2.0], [1.0, 2.0, "x"], [1.0, 2.0, float("nan")], [True, 1, 2], 7):
         with pytest.raises(ValueError, match="shift"):
             from_json({"shift": wrong})
-
-
-def test_told_without_a_traceback_by_the_command(tmp_path, monkeypatch):
-    from langflash_core.__main__ import main
-
-    (tmp_path / "a.ply").write_bytes(ply_bytes(surveyed()))
-    out = io.StringIO()
-    monkeypatch.setattr(
-        "sys.argv", ["langflash", "export", str(tmp_path / "a.ply"), "-o", str(tmp_path / "b.spz")]
-    )
-    with redirect_stdout(out):
-        assert main() in (0, None)
-    assert "lack the (" in out.getvalue()

@@ -8,15 +8,12 @@ from scipy.spatial.transform import Rotation
 
 from langflash_core.base.records import Guess
 from langflash_core.errors import InputError
-from langflash_core.inventory import alignment, beside, inventory
-from langflash_core.inventory.alignment import Fit
+from langflash_core.inventory import alignment, inventory
 from langflash_core.inventory.beside import difference
 from langflash_core.inventory.settings import ALIGNMENT
 from langflash_core.language.spaces import language_space
 from langflash_core.splat import render
 from tests.boxroom import CHAIRS, METRES, TABLE, WORDS, box_room
-
-SAME = Fit(np.eye(3), 1.0, np.zeros(3), 40, 50)
 
 
 @pytest.fixture(scope="module")
@@ -63,9 +60,8 @@ def test_a_wrong_guess_of_lengths_is_put_up_with_and_lengths_told_wrong_are_said
         alignment.align_scenes(guessed, seen, render)
 
 
-def test_three_changes_are_told_by_numbers(room, monkeypatch):
+def test_three_changes_are_told_by_numbers(room, aligned):
     """A chair goes 80 cm, the table goes away, and nothing else changes."""
-    monkeypatch.setattr(beside, "align_scenes", lambda first, second, render: SAME)
     moved = ((CHAIRS[0][0] + 0.8, CHAIRS[0][1]), CHAIRS[1])
     after = inventory(box_room(chairs=moved, table=None).with_record(metric_scale=METRES))
     found = difference(room, after, render)
@@ -78,16 +74,14 @@ def test_three_changes_are_told_by_numbers(room, monkeypatch):
     assert len(back.moved) == 1
 
 
-def test_a_room_beside_itself_is_the_same(room, monkeypatch):
-    monkeypatch.setattr(beside, "align_scenes", lambda first, second, render: SAME)
+def test_a_room_beside_itself_is_the_same(room, aligned):
     found = difference(room, room, render)
     assert not (found.moved or found.came or found.went or found.unseen)
     # The identity is a product in float64, of places within ten metres.
     assert len(found.stayed) == len(room.things) and max(pair.by for pair in found.stayed) < 1e-13
 
 
-def test_what_the_other_scene_calls_something_else_is_not_said_to_have_gone(room, monkeypatch):
-    monkeypatch.setattr(beside, "align_scenes", lambda first, second, render: SAME)
+def test_what_the_other_scene_calls_something_else_is_not_said_to_have_gone(room, aligned):
     scene = box_room().with_record(metric_scale=METRES)
     atoms = scene.semantics.dictionary.clone()
     atoms[WORDS.index("table")] = language_space("minilm").encode(("stool",))[0]
@@ -98,8 +92,7 @@ def test_what_the_other_scene_calls_something_else_is_not_said_to_have_gone(room
     assert ("table", "stool") in [(pair.before.kind, pair.after.kind) for pair in found.stayed]
 
 
-def test_what_no_photo_of_the_other_scene_looks_at_is_not_said_to_have_gone(room, monkeypatch):
-    monkeypatch.setattr(beside, "align_scenes", lambda first, second, render: SAME)
+def test_what_no_photo_of_the_other_scene_looks_at_is_not_said_to_have_gone(room, aligned):
     aside = box_room(table=None).with_record(metric_scale=METRES, world=room.world)
     turned = aside.viewmats.clone()
     turned[:, :3, :3] = turned.new_tensor([[-1.0, 0, 0], [0, 1, 0], [0, 0, -1]]) @ turned[:, :3, :3]

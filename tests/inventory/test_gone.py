@@ -6,16 +6,14 @@ import numpy as np
 import pytest
 
 from langflash_core.geometry.harmonics import SH_C0
-from langflash_core.inventory import beside, inventory
-from langflash_core.inventory.alignment import Fit
+from langflash_core.inventory import inventory
 from langflash_core.inventory.beside import difference
 from langflash_core.inventory.gone import changes, fate
 from langflash_core.inventory.settings import GONE
 from langflash_core.language.spaces import language_space
 from langflash_core.splat import render
 from tests.boxroom import METRES, TABLE, WORDS, box_room
-
-SAME = Fit(np.eye(3), 1.0, np.zeros(3), 40, 50)
+from tests.inventory.conftest import SAME
 
 
 def found_in(scene):
@@ -59,9 +57,8 @@ def test_darker_photos_change_nothing(room):
     assert not told(room, found_in(dark)).gone.any()
 
 
-def test_what_no_inventory_lists_is_found_to_have_moved(room, monkeypatch):
+def test_what_no_inventory_lists_is_found_to_have_moved(room, aligned):
     """A table that both scenes take for a part of the wall."""
-    monkeypatch.setattr(beside, "align_scenes", lambda first, second, render: SAME)
 
     def misnamed(east):
         scene = box_room(chairs=(), table=(east, TABLE[1])).with_record(world=room.world)

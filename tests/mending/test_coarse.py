@@ -8,7 +8,7 @@ import torch
 
 from langflash_core.geometry.harmonics import SH_C0
 from langflash_core.geometry.surfels import covered_areas
-from langflash_core.mending.coarse import coarsen, quantise_colours
+from langflash_core.mending.coarse import coarsen
 from langflash_core.mending.settings import COARSENING
 
 SIDE = 0.15
@@ -60,7 +60,3 @@ def test_places_are_steps(known):
 def test_a_side_of_nothing_is_refused(known):
     with pytest.raises(ValueError, match="above 0"):
         coarsen(known.scene, 0.0, squares=True)
-
-
-def test_quantised_has_sixteen_levels():
-    assert len(set(quantise_colours(torch.linspace(-1, 2, 999)).tolist())) == COARSENING.levels

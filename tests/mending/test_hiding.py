@@ -145,6 +145,24 @@ def looking(camera: Camera, middle: torch.Tensor, aside: torch.Tensor) -> Camera
     return replace(camera, viewmat=viewmat.float())
 
 
+@pytest.mark.parametrize("how", ["remove", "pixels"])
+def test_what_was_hidden_is_hidden_in_every_layer(known, draw, how):
+    scene = known.scene
+    done, report = hide(scene, known.members, draw, Hiding(how))
+    assert done.layered and done.view_ids is not None and report.made > 0
+    assert int((done.view_ids < 0).sum()) == report.made  # in every layer
+    for view in range(2):
+        camera = scene.camera(view)
+        before = draw(scene.layer(view), camera)
+        after = draw(done.layer(view), camera)
+        was = before.depths < 0.8 * before.depths.max()  # the screen's pixels
+        assert 0.03 < float(was.float().mean()) < 0.5
+        # what takes its place closes each layer by itself, but for a rim
+        assert float((after.alphas[was] > 0.5).float().mean()) > 0.9
+        if how == "remove":
+            assert float((after.depths[was] > 0.8 * before.depths.max()).float().mean()) > 0.9
+
+
 def test_names_and_what_nobody_knows_go_with_it(known, draw):
     scene = known.scene.with_record(others={"thumbnail": "secret"}, atom_names={0: "Anna"})
     members = known.members

@@ -2,20 +2,12 @@
 
 import random
 import sys
-from pathlib import Path
 
 import pytest
 
 from tests.torture import kills
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="copies of a process, and signals")
-
-
-@pytest.fixture
-def own(tmp_path, monkeypatch) -> Path:
-    monkeypatch.setenv("LANGFLASH_STATE", str(tmp_path / "state"))
-    monkeypatch.setenv("LANGFLASH_CONFIG", str(tmp_path / "config"))
-    return tmp_path
 
 
 @pytest.mark.filterwarnings("ignore:This process")  # threads of torch's, which the copy does not use

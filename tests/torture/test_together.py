@@ -4,7 +4,6 @@ import contextlib
 import random
 import sys
 import time
-from pathlib import Path
 
 import pytest
 
@@ -17,13 +16,6 @@ pytestmark = [
     pytest.mark.skipif(sys.platform != "linux", reason="copies of a process"),
     pytest.mark.filterwarnings("ignore:This process"),  # threads of torch's, which the copy does not use
 ]
-
-
-@pytest.fixture
-def own(tmp_path, monkeypatch) -> Path:
-    monkeypatch.setenv("LANGFLASH_STATE", str(tmp_path / "state"))
-    monkeypatch.setenv("LANGFLASH_CONFIG", str(tmp_path / "config"))
-    return tmp_path
 
 
 def test_two_programs_lose_nothing(own):
