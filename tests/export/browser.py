@@ -99,6 +99,11 @@ class Browser:
         self.call("Page.navigate", url=path.resolve().as_uri() + fragment)
         self.value("new Promise((done) => (document.readyState === 'complete' ? done() : (onload = done)))")
 
+    def show(self, path: Path, size: tuple[int, int], fragment: str = "", touch: bool = False) -> None:
+        """Open a page of a scene, and wait until its picture is there."""
+        self.open(path, size, fragment, touch)
+        self.value("langflash.then((page) => { page.drawing.read(page.target, 0); return 0; })")
+
     def value(self, expression: str) -> Any:
         """What an expression gives, after its promise, as JSON."""
         result = self.call(

@@ -1,4 +1,4 @@
-"""A browser for all tests of a module."""
+"""A browser for all tests of a module; none of their pages may complain."""
 
 import pytest
 
@@ -6,6 +6,12 @@ from tests.export.browser import browser
 
 
 @pytest.fixture(scope="module")
-def page(tmp_path_factory):
+def chromium(tmp_path_factory):
     with browser(tmp_path_factory.mktemp("browser") / "profile") as opened:
         yield opened
+
+
+@pytest.fixture
+def page(chromium):
+    yield chromium
+    assert chromium.errors == []

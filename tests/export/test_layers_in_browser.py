@@ -18,7 +18,7 @@ from langflash_core.splat import compose, reference
 from langflash_core.types import Camera, Record, Scene
 from tests.app.window.scenes import PHRASES, VIEW_SIZE, room
 from tests.export.browser import Browser, needs_browser
-from tests.export.test_html_in_browser import _READY, TEXT, check_answer, decibels, scores, shown, until
+from tests.export.test_html_in_browser import TEXT, check_answer, decibels, scores, shown, until
 from tests.splat.scenes import turned
 
 pytestmark = needs_browser
@@ -93,10 +93,8 @@ def file(scene, tmp_path_factory) -> Path:
 
 @pytest.fixture
 def opened(page, file):
-    page.open(file, (320, 240))
-    page.value(_READY)
-    yield page
-    assert page.errors == []
+    page.show(file, (320, 240))
+    return page
 
 
 def drawn(page: Browser, camera: Camera, moving: bool = False) -> np.ndarray:
@@ -154,18 +152,15 @@ def test_answers_are_ours(opened, scene):
 
 def test_more_phrases_than_a_pass_takes(page, file):
     """Five beside |f| and the place; the first of the second pass is answered as alone."""
-    page.open(file, (96, 72))
-    page.value(_READY)
+    page.show(file, (96, 72))
     together = scores(page, list(range(7)))
     assert len(together) == 7
     assert together[5] == pytest.approx(scores(page, [5])[0], abs=1e-6)
-    assert page.errors == []
 
 
 def test_at_rest_the_canvas_shows_the_blend_and_stays_so(page, file, scene):
     """After a turn of the camera, and after what is drawn again without one."""
-    page.open(file, VIEW_SIZE, "#bare&mode=photo")
-    page.value(_READY)
+    page.show(file, VIEW_SIZE, "#bare&mode=photo")
     ours = compose.render(scene, scene.camera(0), background=(0.043, 0.051, 0.063), weight_maps=False)
     until(page, "langflash.then((page) => page.still)")
     assert decibels(shown(page), ours.rgb.numpy()) >= 30  # 8 bits, and the canvas resized
@@ -174,7 +169,6 @@ def test_at_rest_the_canvas_shows_the_blend_and_stays_so(page, file, scene):
     until(page, "langflash.then((page) => page.still)")
     page.value("langflash.then((page) => { page.request(); return new Promise(requestAnimationFrame); })")
     assert decibels(shown(page), ours.rgb.numpy()) >= 30
-    assert page.errors == []
 
 
 def test_plan_notes_and_double_clicks_use_layers(opened):
@@ -195,8 +189,7 @@ def test_plan_notes_and_double_clicks_use_layers(opened):
 def test_a_room_without_layers_beside_one_with(page, scene, tmp_path):
     flat = room(language_space("minilm").encode(PHRASES))
     pipeline.web_page(scene, tmp_path / "two.html", ["armchair"], beside={"flat": flat})
-    page.open(tmp_path / "two.html", (320, 240))
-    page.value(_READY)
+    page.show(tmp_path / "two.html", (320, 240))
     until(page, "document.querySelectorAll('#rooms [data-state=found]').length === 2")
     for name in ("flat", "two", "flat"):
         page.value(
@@ -205,4 +198,3 @@ def test_a_room_without_layers_beside_one_with(page, scene, tmp_path):
         until(page, "document.querySelectorAll('.chip[data-state=found]').length === 1")
     assert page.value("langflash.then((page) => page.told.hidden)") is True
     check_answer(page, lf.query(flat, "armchair", view=1), 1)
-    assert page.errors == []

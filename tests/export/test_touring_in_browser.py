@@ -20,7 +20,7 @@ from langflash_core.showing.notebook import Cell, camera_from, page_of
 from langflash_core.types import Gaussians, Scene
 from tests.app.window.scenes import CHAIR, PHRASES, room
 from tests.export.browser import Browser, needs_browser
-from tests.export.test_html_in_browser import _READY, place, until
+from tests.export.test_html_in_browser import place, until
 
 pytestmark = needs_browser
 GUIDE = Path(__file__).resolve().parents[2] / "GUIDE.md"
@@ -55,10 +55,9 @@ def file(scene, tmp_path_factory) -> Path:
 
 @pytest.fixture
 def opened(page, file):
-    page.open(file, (640, 440))
-    page.value(_READY)
+    page.show(file, (640, 440))
     yield page
-    assert page.errors == [] and page.requests == [file.resolve().as_uri()]
+    assert page.requests == [file.resolve().as_uri()]
 
 
 def told(page: Browser) -> str:
@@ -147,8 +146,7 @@ def test_what_passes_is_what_the_formula_says(page, tmp_path):
     some = random_gaussians(300)
     scene = replace(bare_scene(some, "made"), view_ids=torch.zeros(300, dtype=torch.int64))
     pipeline.web_page(scene, tmp_path / "some.html")
-    page.open(tmp_path / "some.html", (320, 240))
-    page.value(_READY)
+    page.show(tmp_path / "some.html", (320, 240))
     from tests.export.pages import read_page
 
     read = read_page(tmp_path / "some.html")
@@ -194,8 +192,7 @@ def test_scenes_of_one_page_are_asked_the_same(opened):
 
 @pytest.mark.parametrize("size", [(390, 844), (1280, 800)])
 def test_nothing_sticks_out_and_everything_has_a_name(page, file, size):
-    page.open(file, size, "#plan", touch=size[0] < 500)
-    page.value(_READY)
+    page.show(file, size, "#plan", touch=size[0] < 500)
     assert page.value("document.documentElement.scrollWidth") <= size[0]
 
     def box(name: str) -> list[float]:
