@@ -27,7 +27,7 @@ from langflash_core.language.spoken import compile_spoken
 from langflash_core.language.vocabulary import all_phrases
 from langflash_core.reconstruction.ahead import Ahead
 from langflash_core.scene.exposure import lit_camera
-from langflash_core.scene.tour import Note, Stop, read_tour
+from langflash_core.scene.tour import read_tour
 from langflash_core.scene.world import upward
 from langflash_core.splat import render as render_reference
 from langflash_core.splat.compose import some_layers
@@ -278,7 +278,8 @@ def web_page(
         )
     if with_text and scene.semantics.space != "minilm":
         raise InputError(f"a page reads words of 'minilm' only, the scene speaks '{scene.semantics.space}'")
-    toured = [each.phrase for s in (scene, *others.values()) for each in _of_tour(s) if each.phrase]
+    tours = [read_tour(each.record.tour) for each in (scene, *others.values())]
+    toured = [each.phrase for tour in tours for each in (*tour.stops, *tour.notes) if each.phrase]
     texts = tuple(dict.fromkeys((*prompts, *toured, *all_phrases())))
     asked = len(dict.fromkeys(prompts))
     first, *rest = (
@@ -299,11 +300,6 @@ def web_page(
 def page_layers(scene: Scene) -> Scene:
     """The scene as a page holds it: of many layers `PAGE_LAYERS` that lie all over the walk."""
     return some_layers(scene, PAGE_LAYERS) if scene.layered else scene
-
-
-def _of_tour(scene: Scene) -> tuple[Stop | Note, ...]:
-    tour = read_tour(scene.record.tour)
-    return (*tour.stops, *tour.notes)
 
 
 def _page_phrases(

@@ -16,15 +16,11 @@ SCENE = "scene.langflash"  # in each set's folder
 
 def jobs_of(sets: Sequence[PhotoSet], output: Path, order: Order) -> list[Job]:
     """A job a set, with absolute paths: a worker may live in another folder."""
-    return [
-        Job(
-            each.name,
-            tuple(photo.absolute() for photo in each.photos),
-            output.absolute() / each.name,
-            fingerprint(each.photos, order),
-        )
-        for each in sets
-    ]
+    jobs = []
+    for each in sets:
+        photos, folder = tuple(photo.absolute() for photo in each.photos), output.absolute() / each.name
+        jobs.append(Job(each.name, photos, folder, fingerprint(each.photos, order)))
+    return jobs
 
 
 def fingerprint(photos: Sequence[Path], order: Order) -> str:
@@ -86,17 +82,6 @@ def _row(ended: Ended) -> Row:
     reason = made.reason
     if reason and job.folder.exists():
         reason += "; what lies in its folder is from before"
-    return Row(
-        name=job.name,
-        status=FAILED if reason else DONE,
-        reason=reason,
-        retried=ended.retried,
-        seconds=made.seconds,
-        photos=len(job.photos),
-        gaussians=made.gaussians,
-        groups=made.groups,
-        found=made.found,
-        memory_mb=made.memory_mb,
-        warnings=" | ".join(made.warnings),
-        fingerprint=job.fingerprint,
-    )
+    told = {**vars(made), "reason": reason, "warnings": " | ".join(made.warnings)}
+    own = {"retried": ended.retried, "photos": len(job.photos), "fingerprint": job.fingerprint}
+    return Row(job.name, FAILED if reason else DONE, **told, **own)

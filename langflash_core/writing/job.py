@@ -24,6 +24,11 @@ def kept_of(result: QueryResult) -> Answers:
     return tuple(replace(each, mask=None) for each in result.answers)
 
 
+def plural(number: int, what: str) -> str:
+    """`1 view`, `2 views`."""
+    return f"{number} {what}{'s' * (number != 1)}"
+
+
 def no_progress(stage: str, fraction: float) -> None:
     """Tells nobody."""
 

@@ -20,8 +20,8 @@ from langflash_core.export.paint import depth_picture, write_picture
 from langflash_core.export.png import to_8bit, write_grey, write_labels, write_mask, write_rgb
 from langflash_core.export.sheet import contact_sheet, thumbnail
 from langflash_core.types import Camera, SegmentedView
-from langflash_core.writing.job import Job
-from langflash_core.writing.subject import Subject, boxes, cut_out, plural, surfaces, taken_apart, views_of
+from langflash_core.writing.job import Job, plural
+from langflash_core.writing.parts import Subject, boxes, cut_out, surfaces, taken_apart, views_of
 
 _GREY = 0.25  # behind phrases on the sheet
 _WIDE = 8  # tiles of a view that fit into a row of their own

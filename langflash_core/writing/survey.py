@@ -24,8 +24,7 @@ from langflash_core.export.png import USUAL, heat_over, to_8bit
 from langflash_core.language.relevance import Mode
 from langflash_core.pipeline import query
 from langflash_core.types import Camera, Frame, PromptAnswer, QueryResult, Scene
-from langflash_core.writing.job import kept_of
-from langflash_core.writing.subject import plural
+from langflash_core.writing.job import kept_of, plural
 
 MOST_VIEWS = 4
 """Of a scene, evenly among its photos: each takes as long as a query."""

@@ -11,7 +11,7 @@ from langflash_core.export.npz import write_npz, write_view
 from langflash_core.export.paint import write_picture
 from langflash_core.export.png import heat_over, label_map, to_8bit, write_labels, write_mask, write_rgb
 from langflash_core.types import Camera, QueryResult
-from langflash_core.writing.job import Answers, Job, check_found, kept_of
+from langflash_core.writing.job import Answers, Job, check_found, kept_of, plural
 
 
 def write_pictures(job: Job) -> str:
@@ -128,4 +128,4 @@ def write_coco_masks(job: Job) -> str:
         write_coco(pictured(job.answers(cameras, renderer)), names, staging / output.name)
         check_found(answers)
     masks = sum(answer.found for view in answers for answer in view)
-    return f"{masks} mask{'s' * (masks > 1)}, pictures in {', '.join(names)}"
+    return f"{plural(masks, 'mask')}, pictures in {', '.join(names)}"

@@ -9,8 +9,7 @@ from langflash_core.writing.inventory.drawing import plan_svg
 from langflash_core.writing.inventory.dxf import plan_dxf
 from langflash_core.writing.inventory.page import page_of
 from langflash_core.writing.inventory.tables import table_csv, table_json
-from langflash_core.writing.job import Job
-from langflash_core.writing.subject import plural
+from langflash_core.writing.job import Job, plural
 
 
 def write_inventory(job: Job) -> str:

@@ -10,6 +10,7 @@ from langflash_core.inventory.plan import Plan
 from langflash_core.inventory.things import Inventory, Thing
 from langflash_core.writing.inventory.drawing import plan_svg
 from langflash_core.writing.inventory.words import doubt_of, length, scale_note, size
+from langflash_core.writing.job import plural
 
 _HEAD = """<!DOCTYPE html>
 <html lang="en"><head><meta charset="utf-8"><meta name="viewport" content="width=device-width">
@@ -51,8 +52,7 @@ def page_of(found: Inventory, plan: Plan, cutouts: Mapping[str, str], title: str
         cutouts: a data URL of a picture by the thing's id.
     """
     photos = found.scene.num_views if found.scene.photos else 0
-    seen = f", seen by {photos} photo{'s' * (photos != 1)}" if photos else ""
-    count = f"{len(found.things)} thing{'s' * (len(found.things) != 1)}"
+    seen = f", seen by {plural(photos, 'photo')}" if photos else ""
     kinds = "".join(f"<li><b>{number}</b> {escape(kind)}</li>" for kind, number in found.counts.items())
     numbers = {thing.id: number + 1 for number, thing in enumerate(plan.things)}
     rows = "".join(
@@ -61,7 +61,7 @@ def page_of(found: Inventory, plan: Plan, cutouts: Mapping[str, str], title: str
     )
     return (
         _HEAD.format(title=escape(title))
-        + f"<h1>{escape(title)}</h1><p>{count}{seen}</p>"
+        + f"<h1>{escape(title)}</h1><p>{plural(len(found.things), 'thing')}{seen}</p>"
         + f'<p class="soft">{escape(scale_note(found.guess, found.unit))} '
         + "Sizes are those of what photos saw.</p>"
         + f'<ul class="kinds">{kinds}</ul>'
