@@ -17,7 +17,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-import torch
 
 from langflash_core.errors import SceneFileError
 from langflash_core.export import export, read
@@ -25,7 +24,7 @@ from langflash_core.scene.bare import bare_scene
 from langflash_core.scene.container import Container, read_container, write_container
 from langflash_core.types import Gaussians
 from tests.export.mutations import whole_files
-from tests.export.splats import random_gaussians
+from tests.export.splats import random_gaussians, same
 
 Random = np.random.Generator
 Add = Callable[[bytes, Random], tuple[bytes, str]]
@@ -485,6 +484,5 @@ def outcome(path: Path, expected: Gaussians, words: tuple[str, ...]) -> str:
         assert "\n" not in sentence and len(sentence) < 500 and "; " in sentence, sentence
         assert any(word in sentence for word in words), (words, sentence)
         return "refused"
-    for name, values in vars(expected).items():
-        assert torch.equal(values, getattr(found, name)), f"{name} are others"
+    assert same(expected, found), "its numbers are others"
     return "read"

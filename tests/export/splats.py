@@ -2,12 +2,15 @@
 
 import json
 import struct
+from collections.abc import Callable
 from pathlib import Path
 
 import numpy as np
+import pytest
 import torch
 from torch.nn.functional import normalize
 
+from langflash_core.errors import SceneFileError
 from langflash_core.types import Gaussians
 
 NAMES = (
@@ -32,6 +35,20 @@ def random_gaussians(count: int, degree: int = 0, seed: int = 0) -> Gaussians:
         opacities=opacities,
         sh=draw(count, (degree + 1) ** 2, 3),
     )
+
+
+def same(one: Gaussians, other: Gaussians) -> bool:
+    """To the last bit."""
+    return all(torch.equal(values, getattr(other, name)) for name, values in vars(one).items())
+
+
+def refusal(read: Callable[[], object]) -> str:
+    """The one sentence by which a file is refused."""
+    with pytest.raises(SceneFileError) as caught:
+        read()
+    sentence = str(caught.value)
+    assert "; " in sentence and "\n" not in sentence, sentence
+    return sentence
 
 
 def stored_columns(count: int = 50, seed: int = 0) -> dict[str, np.ndarray]:

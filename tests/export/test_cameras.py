@@ -14,7 +14,7 @@ from langflash_core.export.cameras import read_posed
 from langflash_core.geometry.quaternions import quats_to_matrices
 from langflash_core.scene.bare import bare_scene
 from langflash_core.types import Scene
-from tests.export.splats import random_gaussians
+from tests.export.splats import random_gaussians, refusal
 
 WIDTH, HEIGHT = 84, 56
 NAMES = ("cameras.txt", "transforms.json")
@@ -107,9 +107,7 @@ def frame(matrix: str = "[[1,0,0,0],[0,1,0,0],[0,0,1,0]]", **own: float) -> str:
 )
 def test_transforms_that_cannot_be_used(tmp_path, text, word):
     (tmp_path / "transforms.json").write_text(text)
-    with pytest.raises(SceneFileError, match=word) as caught:
-        read_posed(tmp_path / "transforms.json")
-    assert "\n" not in str(caught.value) and "; " in str(caught.value)
+    assert word in refusal(lambda: read_posed(tmp_path / "transforms.json"))
 
 
 @pytest.mark.parametrize(
@@ -126,9 +124,7 @@ def test_transforms_that_cannot_be_used(tmp_path, text, word):
 def test_colmap_that_cannot_be_used(tmp_path, cameras, images, word):
     (tmp_path / "cameras.txt").write_text(cameras)
     (tmp_path / "images.txt").write_text(images)
-    with pytest.raises(SceneFileError, match=word) as caught:
-        read_posed(tmp_path)
-    assert "\n" not in str(caught.value) and "; " in str(caught.value)
+    assert word in refusal(lambda: read_posed(tmp_path))
 
 
 def test_what_is_missing_is_said(tmp_path, scene):

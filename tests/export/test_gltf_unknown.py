@@ -21,7 +21,7 @@ from langflash_core.export import export, read
 from langflash_core.export.gltf_document import glb_head
 from langflash_core.scene.bare import bare_scene
 from langflash_core.types import Gaussians
-from tests.export.splats import random_gaussians
+from tests.export.splats import random_gaussians, refusal, same
 
 SPLATS = "KHR_gaussian_splatting"
 REPEATS = "EXT_mesh_gpu_instancing"
@@ -292,11 +292,6 @@ NEEDED: tuple[tuple[Callable[[File], object], str], ...] = (
 )
 
 
-def same(first: Gaussians, second: Gaussians) -> bool:
-    fields = ("means", "quats", "scales", "opacities", "sh")
-    return all(torch.equal(getattr(first, name), getattr(second, name)) for name in fields)
-
-
 @pytest.fixture
 def plain(tmp_path) -> Gaussians:
     return read(File(tmp_path).written()).gaussians
@@ -323,9 +318,7 @@ def test_many_at_once(tmp_path, plain, seed):
         needed(file)
     path = file.written(str(rng.choice(["glb", "file", "base64", "percent"])))
     if seed % 2:
-        with pytest.raises(SceneFileError) as caught:
-            read(path)
-        assert word in str(caught.value)
+        assert word in refusal(lambda: read(path))
     else:
         assert same(read(path).gaussians, plain)
 
@@ -334,10 +327,8 @@ def test_many_at_once(tmp_path, plain, seed):
 def test_what_is_needed_is_refused_by_name(tmp_path, needed, word):
     file = File(tmp_path)
     needed(file)
-    with pytest.raises(SceneFileError) as caught:
-        read(file.written())
-    said = str(caught.value)
-    assert word in said and said.startswith("b.glb ") and "; " in said and "\n" not in said
+    said = refusal(lambda: read(file.written()))
+    assert word in said and said.startswith("b.glb ")
 
 
 def test_indices_choose_rows(tmp_path, plain):

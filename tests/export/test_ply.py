@@ -12,7 +12,7 @@ from langflash_core.export import export, read
 from langflash_core.export.settings import STORED
 from langflash_core.scene.bare import bare_scene
 from langflash_core.scene.checks import check_scene
-from tests.export.splats import ply_bytes, random_gaussians, stored_columns
+from tests.export.splats import ply_bytes, random_gaussians, same, stored_columns
 
 
 def written(tmp_path, gaussians):
@@ -69,8 +69,7 @@ def test_order_types_and_strangers_do_not_matter(tmp_path, order):
         ply_bytes(mixed, order, before=bytes(16), after=after, header=header)
     )
     plain, strange = read(tmp_path / "plain.ply").gaussians, read(tmp_path / "mixed.ply").gaussians
-    for name, values in vars(plain).items():
-        assert torch.equal(values, getattr(strange, name)), name
+    assert same(plain, strange)
     assert torch.allclose(plain.scales[:, 1], torch.from_numpy(columns["scale_1"]).exp())
     assert torch.allclose(plain.opacities, torch.from_numpy(columns["opacity"]).sigmoid())
 
@@ -145,8 +144,7 @@ def test_more_rows_than_are_read_at_once(tmp_path, monkeypatch):
     for module in ("ply", "stored"):
         monkeypatch.setattr(f"langflash_core.export.{module}.STORED", replace(STORED, rows_at_once=64))
     in_parts = read(written(tmp_path, random_gaussians(1000, 1))).gaussians
-    for name, values in vars(whole).items():
-        assert torch.equal(values, getattr(in_parts, name)), name
+    assert same(whole, in_parts)
 
 
 def test_what_stops_the_writing_leaves_the_old_file(tmp_path):

@@ -18,7 +18,8 @@ from langflash_core.level import upright
 from langflash_core.lift import posed_views
 from langflash_core.writing import write
 from tests.app.cli.conftest import stripes
-from tests.export.splats import NAMES, ply_bytes, stored_columns
+from tests.export import splats
+from tests.export.splats import NAMES, ply_bytes, same, stored_columns
 
 SURVEYED = (448_262.0, 5_411_932.0, 117.0)  # metres east, north (UTM) and up
 
@@ -34,15 +35,7 @@ def gaussians_of(tmp_path, content: bytes):
 
 def refusal(tmp_path, content: bytes) -> str:
     (tmp_path / "a.ply").write_bytes(content)
-    with pytest.raises(SceneFileError) as caught:
-        read(tmp_path / "a.ply")
-    sentence = str(caught.value)
-    assert sentence.startswith("a.ply ") and "; " in sentence and "\n" not in sentence
-    return sentence
-
-
-def same(one, other) -> bool:
-    return all(torch.equal(values, getattr(other, name)) for name, values in vars(one).items())
+    return splats.refusal(lambda: read(tmp_path / "a.ply"))
 
 
 def halves(columns):

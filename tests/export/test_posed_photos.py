@@ -1,6 +1,5 @@
 """Poses stay with their photo: folders, EXIF, lenses, and COLMAP's files as programs really write them."""
 
-import io
 import json
 import struct
 from dataclasses import replace
@@ -18,7 +17,7 @@ from langflash_core.export.settings import POINT_CLOUD
 from langflash_core.geometry.cameras import MIRRORED, turned_camera
 from langflash_core.images.decode import read_photo
 from langflash_core.images.views import load_views
-from tests.export.splats import random_gaussians
+from tests.export.splats import random_gaussians, refusal
 from tests.export.test_cameras import scene as scene
 
 LENS = "1 PINHOLE 64 48 50 51 30 25\n"
@@ -179,11 +178,9 @@ def test_every_photo_keeps_its_own_lens(tmp_path):
     ],
 )
 def test_lenses_that_are_no_pinhole_are_refused_by_name(tmp_path, lens):
-    with pytest.raises(SceneFileError, match=r"no pinhole|bends") as caught:
-        read_posed(transforms(tmp_path / "transforms.json", ["a.jpg"], **lens))
-    assert str(lens.get("camera_model", next(iter(lens)) if "is_fisheye" in lens else "")) in str(
-        caught.value
-    )
+    said = refusal(lambda: read_posed(transforms(tmp_path / "transforms.json", ["a.jpg"], **lens)))
+    assert "no pinhole" in said or "bends" in said
+    assert str(lens.get("camera_model", next(iter(lens)) if "is_fisheye" in lens else "")) in said
     document = json.loads((tmp_path / "transforms.json").read_text())
     document["frames"][0] |= {name: document.pop(name) for name in lens}  # said of one frame
     (tmp_path / "transforms.json").write_text(json.dumps(document))
@@ -266,9 +263,7 @@ def test_binary_models_that_are_cut_or_lie_are_refused(tmp_path):
     for name, whole in (("cameras.bin", cameras), ("images.bin", images)):
         for wrong in (*(whole[:size] for size in range(len(whole))), whole + b"\0", b"\xff" * 8 + whole[8:]):
             (tmp_path / name).write_bytes(wrong)
-            with pytest.raises(SceneFileError) as caught:
-                read_posed(tmp_path)
-            assert "\n" not in str(caught.value) and "; " in str(caught.value)
+            refusal(lambda: read_posed(tmp_path))
         (tmp_path / name).write_bytes(whole)
     points = images.index(struct.pack("<Q", 2), 8)
     (tmp_path / "images.bin").write_bytes(images[:points] + b"\xff" * 8 + images[points + 8 :])
@@ -304,9 +299,6 @@ def test_what_is_written_begins_in_every_trainer(tmp_path, scene, monkeypatch):
 
 
 def test_texts_in_other_encodings_are_refused_in_one_sentence(tmp_path):
-    stream = io.StringIO(LENS)
     model(tmp_path, ["a.jpg"])
-    (tmp_path / "cameras.txt").write_bytes(stream.getvalue().encode("utf-16"))
-    with pytest.raises(SceneFileError, match="does not hold posed photos") as caught:
-        read_posed(tmp_path)
-    assert "\n" not in str(caught.value)
+    (tmp_path / "cameras.txt").write_bytes(LENS.encode("utf-16"))
+    assert "does not hold posed photos" in refusal(lambda: read_posed(tmp_path))

@@ -5,10 +5,9 @@ import struct
 import pytest
 import torch
 
-from langflash_core.errors import SceneFileError
 from langflash_core.export import export, read
 from langflash_core.geometry.harmonics import SH_C0
-from tests.export.splats import ply_bytes, stored_columns
+from tests.export.splats import ply_bytes, refusal, stored_columns
 
 
 def test_one_row_by_hand(tmp_path):
@@ -38,6 +37,4 @@ def test_one_row_by_hand(tmp_path):
 )
 def test_what_is_no_splat_is_refused_in_one_sentence(tmp_path, content, word):
     (tmp_path / "bad.splat").write_bytes(content)
-    with pytest.raises(SceneFileError, match=word) as caught:
-        read(tmp_path / "bad.splat")
-    assert "\n" not in str(caught.value) and "; " in str(caught.value)
+    assert word in refusal(lambda: read(tmp_path / "bad.splat"))
