@@ -65,7 +65,6 @@ class RayWorkers:
 
     @property
     def busy(self) -> Sequence[Job]:
-        """What is under way."""
         return tuple(job for job, _ in self._jobs.values())
 
     def start(self, job: Job) -> None:
@@ -74,7 +73,6 @@ class RayWorkers:
         self._jobs[actor.make.remote(job)] = job, actor
 
     def wait(self, seconds: float) -> list[tuple[Job, Made | Lost]]:
-        """What has ended; waits at most so long for the first."""
         ready, _ = self._ray.wait(list(self._jobs), timeout=seconds)
         return [self._result(reference) for reference in ready]
 

@@ -48,7 +48,7 @@ OpenMaker = Callable[[], AbstractContextManager[Make]]
 
 @runtime_checkable
 class Workers(Protocol):
-    """Who does jobs, one at a time each. A worker that died is replaced."""
+    """Who does jobs, one at a time each. A worker that died is replaced. What its methods do is said here."""
 
     count: int
 

@@ -27,7 +27,6 @@ class LocalWorkers:
 
     @property
     def busy(self) -> Sequence[Job]:
-        """What is under way."""
         return tuple(self._jobs.values())
 
     def start(self, job: Job) -> None:
@@ -46,7 +45,6 @@ class LocalWorkers:
             pipe.send(job)
 
     def wait(self, seconds: float) -> list[tuple[Job, Made | Lost]]:
-        """What has ended; waits at most so long for the first."""
         ended, ready = [], wait(list(self._jobs), seconds)
         for pipe in [pipe for pipe in self._jobs if pipe in ready]:
             job = self._jobs.pop(pipe)

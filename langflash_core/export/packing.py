@@ -69,6 +69,11 @@ def from_smallest_three(largest: np.ndarray, others: np.ndarray) -> np.ndarray:
     return quats
 
 
+def to_bytes(values: np.ndarray) -> np.ndarray:
+    """Rounded to uint8, 0 to 255."""
+    return np.clip(np.round(values), 0, 255).astype(np.uint8)
+
+
 def morton_order(means: np.ndarray) -> np.ndarray:
     """Order (n,) along a Z curve of 1024 steps a side: neighbours in space become neighbours in the file."""
     low = means.min(0)

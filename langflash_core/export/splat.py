@@ -12,6 +12,7 @@ import numpy as np
 
 from langflash_core.base.files import write_atomically
 from langflash_core.errors import SceneFileError
+from langflash_core.export.packing import to_bytes
 from langflash_core.export.settings import SPLAT_BYTES, STORED
 from langflash_core.export.stored import Gathering, Rows, parts, to_scene
 from langflash_core.geometry.harmonics import SH_C0
@@ -67,11 +68,7 @@ def _encode(gaussians: Gaussians) -> Iterator[bytes]:
     for part in parts(gaussians):
         rows = np.empty(len(part.means), _ROW)
         rows["mean"], rows["scale"] = part.means, part.scales
-        rows["rgba"][:, :3] = _bytes((0.5 + SH_C0 * part.sh[:, 0]) * 255)
-        rows["rgba"][:, 3] = _bytes(part.opacities * 255)
-        rows["quat"] = _bytes(part.quats * 128 + 128)
+        rows["rgba"][:, :3] = to_bytes((0.5 + SH_C0 * part.sh[:, 0]) * 255)
+        rows["rgba"][:, 3] = to_bytes(part.opacities * 255)
+        rows["quat"] = to_bytes(part.quats * 128 + 128)
         yield rows.tobytes()
-
-
-def _bytes(values: np.ndarray) -> np.ndarray:
-    return np.clip(np.round(values), 0, 255).astype(np.uint8)

@@ -27,6 +27,7 @@ from langflash_core.export.packing import (
     has_zstd,
     inflate,
     smallest_three,
+    to_bytes,
     transform_rows,
     zstd_inflated,
     zstd_packed,
@@ -284,10 +285,10 @@ def _columns(rows: Rows, version: int, bits: int) -> tuple[bytes, ...]:
     upright = np.where(rows.quats[:, :1] < 0, -rows.quats, rows.quats)
     return (
         places.tobytes(),
-        _bytes(rows.opacities * 255),
-        _bytes((rows.sh[:, 0] * _COLOUR_SCALE + 0.5) * 255),
-        _bytes((np.log(rows.scales) + 10) * 16),
-        _bytes(upright[:, 1:] * 127.5 + 127.5) if version == 2 else _signed_words(rows.quats),
+        to_bytes(rows.opacities * 255).tobytes(),
+        to_bytes((rows.sh[:, 0] * _COLOUR_SCALE + 0.5) * 255).tobytes(),
+        to_bytes((np.log(rows.scales) + 10) * 16).tobytes(),
+        to_bytes(upright[:, 1:] * 127.5 + 127.5).tobytes() if version == 2 else _signed_words(rows.quats),
         rest.astype(np.uint8).tobytes(),
     )
 
@@ -298,7 +299,3 @@ def _signed_words(quats: np.ndarray) -> bytes:
     fields = np.minimum(sizes, 511) | np.where(others < 0, 512, 0).astype(np.uint32)
     words = largest.astype(np.uint32) << 30 | fields[:, 0] << 20 | fields[:, 1] << 10 | fields[:, 2]
     return words.astype("<u4").tobytes()
-
-
-def _bytes(values: np.ndarray) -> bytes:
-    return np.clip(np.round(values), 0, 255).astype(np.uint8).tobytes()

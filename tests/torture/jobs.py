@@ -201,39 +201,17 @@ def _keeping(scene: Scene) -> Iterator[Job]:
     histories = [_history(first, count) for count in (1, 2)]
 
     def kept(count: int) -> Callable[[Path], tuple[int, str]]:
-        def run(folder: Path) -> tuple[int, str]:
-            edits.keep(scene, histories[count], "room", None, "deadbeef")
-            return 0, ""
-
-        return run
+        return _doing(lambda _: edits.keep(scene, histories[count], "room", None, "deadbeef") and "")
 
     def session(name: str) -> Callable[[Path], tuple[int, str]]:
-        def run(folder: Path) -> tuple[int, str]:
-            keeper = _keeper()
-            try:
-                keeper.keep(
-                    Kept(name=name, phrases=(name,), likes=("",), thresholds=(None,), visible=(True,))
-                )
-            finally:
-                if keeper._lock is not None:  # the process goes on: only a death or `close` opens it
-                    keeper._lock.close()
-            return 0, ""
-
-        return run
+        said = Kept(name=name, phrases=(name,), likes=("",), thresholds=(None,), visible=(True,))
+        return _doing(lambda _: _keep_session(said))
 
     def preferred(scale: float) -> Callable[[Path], tuple[int, str]]:
-        def run(folder: Path) -> tuple[int, str]:
-            said = preferences.try_to_save(replace(preferences.DEFAULTS, scale=scale))
-            return (1, f"langflash: {said}") if said else (0, "")
-
-        return run
+        return _doing(lambda _: preferences.try_to_save(replace(preferences.DEFAULTS, scale=scale)))
 
     def saved(which: Scene) -> Callable[[Path], tuple[int, str]]:
-        def run(folder: Path) -> tuple[int, str]:
-            save(which, folder / "out" / "a.langflash")
-            return 0, ""
-
-        return run
+        return _doing(lambda folder: save(which, folder / "out" / "a.langflash"))
 
     less = replace(scene, photos=())
     yield Job("save", saved(scene), saved(less), FILES)
@@ -243,6 +221,25 @@ def _keeping(scene: Scene) -> Iterator[Job]:
     again, killed = (_recover(scene, histories[1], write) for write in (False, True))
     yield Job("recovery of edits", again, killed, ("read", "place"), fresh=False)
     yield Job("recovery of a session", _restored_session, _killed_session, ("read", "place"), fresh=False)
+
+
+def _doing(work: Callable[[Path], object]) -> Callable[[Path], tuple[int, str]]:
+    """What `work` gives is what it has to complain of."""
+
+    def run(folder: Path) -> tuple[int, str]:
+        said = work(folder)
+        return (1, f"langflash: {said}") if said else (0, "")
+
+    return run
+
+
+def _keep_session(said: Kept) -> None:
+    keeper = _keeper()
+    try:
+        keeper.keep(said)
+    finally:
+        if keeper._lock is not None:  # the process goes on: only a death or `close` opens it
+            keeper._lock.close()
 
 
 def _history(first: Marks, count: int) -> History:
