@@ -37,15 +37,6 @@ def test_every_set_once_and_never_more_than_the_workers(place):
     assert all((place.output / row.name / SCENE).read_text() == "well" for row in rows)
 
 
-def test_bad_ones_are_a_list(place):
-    for name, what in (("a", "bad"), ("b", "well"), ("c", "bad")):
-        place.add(name, what)
-    place.run()
-    assert _statuses(place.ledger()) == {"a": "failed", "b": "done", "c": "failed"}
-    assert place.ledger()[0].reason == "it is no picture; take another"
-    assert not (place.output / "a").exists()
-
-
 def test_what_was_there_before_a_failure_stays(place):
     photo = place.add("a")
     place.run()
