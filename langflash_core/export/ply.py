@@ -102,11 +102,10 @@ def _activate_rows(gathering: Gathering, numbers: Numbers, name: str, layout: _L
     stored, warnings = gathering.stored(), list(numbers.said)
     known = layout.own or filter_of(layout.row.names) is not None  # whose writers leave nothing to guess
     # As logits, opacities in [0, 1] alone would be 0.5 to 0.73, which no capture has.
-    logits = (
-        known
-        or not len(stored.opacities)
-        or not (float(stored.opacities.min()) >= 0 and float(stored.opacities.max()) <= 1)
+    activated = (
+        len(stored.opacities) and 0 <= float(stored.opacities.min()) <= float(stored.opacities.max()) <= 1
     )
+    logits = known or not activated
     logs = known or not _looks_linear(stored)
     if not logits:
         warnings.append("All opacities lie between 0 and 1, so they are taken as they are, not as logits.")

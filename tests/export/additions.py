@@ -119,23 +119,6 @@ def comment(content: bytes, rng: Random) -> tuple[bytes, str]:
     return Ply(head, ply.elements, ply.bodies).packed(), "comment"
 
 
-def header_line(content: bytes, rng: Random) -> tuple[bytes, str]:
-    ply = ply_of(content)
-    return Ply((*ply.head, "extension stranger 1"), ply.elements, ply.bodies).packed(), "extension stranger"
-
-
-def windows_lines(content: bytes, rng: Random) -> tuple[bytes, str]:
-    return ply_of(content).packed("\r\n"), "header"
-
-
-def spaces(content: bytes, rng: Random) -> tuple[bytes, str]:
-    return ply_of(content).packed("\t \n"), "header"
-
-
-def newline_after(content: bytes, rng: Random) -> tuple[bytes, str]:
-    return content + b"\n", "found"
-
-
 def other_endian(content: bytes, rng: Random) -> tuple[bytes, str]:
     ply = ply_of(content)
     head = tuple(line.replace("binary_little", "binary_big") for line in ply.head)
@@ -156,10 +139,6 @@ def ascii_text(content: bytes, rng: Random) -> tuple[bytes, str]:
         for index, body in enumerate(ply.bodies)
     )
     return Ply(head, ply.elements, bodies).packed(), "ascii"
-
-
-def other_version(content: bytes, rng: Random) -> tuple[bytes, str]:
-    return content.replace(b"endian 1.0", b"endian 1.7", 1), "1.7"
 
 
 def property_more(content: bytes, rng: Random) -> tuple[bytes, str]:
@@ -415,9 +394,21 @@ def _changed_scene(content: bytes, change, version: int | None = None) -> tuple[
         return path.read_bytes(), "stranger" if version is None else f"format {version}"
 
 
+def header_line(content: bytes, rng: Random) -> tuple[bytes, str]:
+    ply = ply_of(content)
+    return Ply((*ply.head, "extension stranger 1"), ply.elements, ply.bodies).packed(), "extension stranger"
+
+
+def newline_after(content: bytes, rng: Random) -> tuple[bytes, str]:
+    return content + b"\n", "found"
+
+
 _PLY = (
-    comment, header_line, windows_lines, spaces, newline_after, other_endian, ascii_text, other_version,
-    property_more, list_among_points, element_more, other_order, elements_in_other_order, other_type,
+    comment, header_line, newline_after, other_endian, ascii_text, property_more,
+    list_among_points, element_more, other_order, elements_in_other_order, other_type,
+    lambda content, rng: (ply_of(content).packed("\r\n"), "header"),
+    lambda content, rng: (ply_of(content).packed("\t \n"), "header"),
+    lambda content, rng: (content.replace(b"endian 1.0", b"endian 1.7", 1), "1.7"),
 )  # fmt: skip
 _SPZ = (spz_flag, spz_version, spz_streams, spz_spare, spz_extension)
 _SOG = (sog_key, sog_version, sog_encoding, sog_bands, sog_file)
