@@ -7,7 +7,6 @@ Nothing is trained. What no view shows takes the weights of the nearest Gaussian
 scene itself are from where people would stand (`scene.lookouts`).
 """
 
-import io
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -17,10 +16,10 @@ from pathlib import Path
 import numpy as np
 import torch
 from jaxtyping import Float
-from PIL import Image
 from scipy.spatial import KDTree
 from torch import Tensor
 
+from langflash_core.base.picture_files import encoded
 from langflash_core.base.records import Shift
 from langflash_core.errors import Cancelled, InputError
 from langflash_core.export.cameras import read_posed
@@ -234,13 +233,9 @@ def own_views(frames: Sequence[Frame], cameras: Sequence[Camera]) -> Views:
         images.append(grey.clamp(0, 1).permute(2, 0, 1).float())
     names = tuple(f"view {number}" for number in range(1, len(frames) + 1))
     Ks = torch.stack([camera.K.float() for camera in cameras])
-    return Views(torch.stack(images), Ks, names, tuple(_jpeg(image) for image in images))
-
-
-def _jpeg(image: Tensor) -> bytes:
-    stream = io.BytesIO()
-    Image.fromarray(to_8bit(image.permute(1, 2, 0))).save(stream, "JPEG", quality=LIFTING.quality)
-    return stream.getvalue()
+    pixels = (to_8bit(image.permute(1, 2, 0)) for image in images)
+    sources = tuple(encoded(each, "JPEG", quality=LIFTING.quality) for each in pixels)
+    return Views(torch.stack(images), Ks, names, sources)
 
 
 def _check_shown(frames: Sequence[Frame]) -> None:

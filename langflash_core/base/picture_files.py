@@ -15,10 +15,10 @@ from contextlib import contextmanager
 from functools import cache
 from io import BufferedIOBase
 from pathlib import Path
-from typing import IO, cast
+from typing import IO, Any, cast
 
 import numpy as np
-from jaxtyping import UInt8
+from jaxtyping import Shaped, UInt8
 from PIL import Image
 
 from langflash_core.base.limits import PIXELS, PROFILE
@@ -96,6 +96,14 @@ def decoded_photo(photo: bytes, mode: str = "RGB") -> UInt8[np.ndarray, "H W *c"
             return np.asarray(opened.convert(mode))
     except (OSError, SyntaxError, ValueError):
         return None
+
+
+def encoded(picture: Shaped[np.ndarray, "..."] | Image.Image, kind: str, **options: Any) -> bytes:
+    """A picture's file. kind, options: a format of Pillow's, and how it writes it."""
+    stream = io.BytesIO()
+    image = picture if isinstance(picture, Image.Image) else Image.fromarray(np.ascontiguousarray(picture))
+    image.save(stream, kind, **options)
+    return stream.getvalue()
 
 
 def stored_shape(picture: Image.Image) -> tuple[tuple[int, int], int]:

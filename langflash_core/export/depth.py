@@ -6,17 +6,16 @@ file (text chunks `step` and `unit`: depth = value * step), an EXR the lengths t
 attributes `unit` and `langflash`). Row 0 is the top.
 """
 
-import io
 import math
 from pathlib import Path
 
 import numpy as np
 from jaxtyping import Float
-from PIL import Image
 from PIL.PngImagePlugin import PngInfo
 
 from langflash_core.base.files import write_atomically, written_atomically
 from langflash_core.base.optional import optional_packages
+from langflash_core.base.picture_files import encoded
 from langflash_core.export.settings import DEPTH_FILE
 from langflash_core.types import Frame
 
@@ -54,9 +53,7 @@ def write_depth_png(path: Path, depths: Float[np.ndarray, "H W"], step: float, u
     said = PngInfo()
     said.add_text("step", f"{step:g}")
     said.add_text("unit", unit)
-    stream = io.BytesIO()
-    Image.fromarray(counts).save(stream, "PNG", pnginfo=said)
-    write_atomically(path, stream.getvalue())
+    write_atomically(path, encoded(counts, "PNG", pnginfo=said))
 
 
 def write_depth_exr(path: Path, depths: Float[np.ndarray, "H W"], unit: str) -> None:

@@ -3,15 +3,14 @@
 The window paints the same by shaders. Colours, heat-maps and label maps are in `png.py`.
 """
 
-import io
 from pathlib import Path
 
 import numpy as np
 import torch
-from PIL import Image
 from torch import Tensor
 
 from langflash_core.base.files import make_folder, write_atomically
+from langflash_core.base.picture_files import encoded
 from langflash_core.export.colours import atom_colours, heat
 from langflash_core.export.png import to_8bit
 from langflash_core.types import Frame
@@ -25,10 +24,8 @@ def write_picture(path: Path, pixels: np.ndarray) -> None:
     Raises:
         OutputError: the folder cannot be made or written.
     """
-    stream = io.BytesIO()
-    Image.fromarray(np.ascontiguousarray(pixels)).save(stream, "PNG")
     make_folder(path.parent)
-    write_atomically(path, stream.getvalue())
+    write_atomically(path, encoded(pixels, "PNG"))
 
 
 def atom_picture(frame: Frame, dictionary: Tensor) -> np.ndarray:

@@ -1,6 +1,5 @@
 """PNG pictures of views and answers. Every file is whole or absent (`files.py`)."""
 
-import io
 import json
 from collections.abc import Sequence
 from pathlib import Path
@@ -12,6 +11,7 @@ from torch import Tensor
 
 from langflash_core.base.colormaps import HeatColours
 from langflash_core.base.files import write_atomically
+from langflash_core.base.picture_files import encoded
 from langflash_core.export.colours import heat, label_colours
 from langflash_core.export.settings import PAINTING
 from langflash_core.scene.gaps import fill_gaps
@@ -32,13 +32,13 @@ def write_rgb(path: Path, rgb: Tensor) -> None:
 
 def rgb_file(rgb: Tensor) -> bytes:
     """What `write_rgb` writes."""
-    return _encode(Image.fromarray(to_8bit(rgb)))
+    return encoded(to_8bit(rgb), "PNG")
 
 
 def write_mask(path: Path, mask: Tensor) -> None:
     """A mask (H, W) bool: 255 inside, 0 outside."""
     _check_map("mask", mask)
-    write_atomically(path, _encode(Image.fromarray(mask.cpu().numpy().astype(np.uint8) * 255)))
+    write_atomically(path, encoded(mask.cpu().numpy().astype(np.uint8) * 255, "PNG"))
 
 
 def write_grey(path: Path, values: Tensor, low: float, high: float) -> None:
@@ -52,7 +52,7 @@ def write_grey(path: Path, values: Tensor, low: float, high: float) -> None:
         raise ValueError(f"low, high: expected low < high, received {low}, {high}")
     share = torch.nan_to_num((values.detach().cpu().double() - low) / (high - low), nan=0.0).clamp(0, 1)
     counts = (share * (2**16 - 1)).round().numpy().astype(np.uint16)
-    write_atomically(path, _encode(Image.fromarray(counts)))
+    write_atomically(path, encoded(counts, "PNG"))
 
 
 def write_relevance(path: Path, relevance: Tensor, mode: str) -> None:
@@ -125,7 +125,7 @@ def write_labels(path: Path, labels: Tensor, names: Sequence[str]) -> None:
     ]
     legend = json.dumps({"picture": path.name, "labels": entries}, indent=2, ensure_ascii=False)
     write_atomically(path.with_suffix(".json"), legend.encode())
-    write_atomically(path, _encode(image))
+    write_atomically(path, encoded(image, "PNG"))
 
 
 def label_map(result: QueryResult) -> Tensor:
@@ -173,9 +173,3 @@ def to_8bit(rgb: Tensor) -> np.ndarray:
 def _check_map(name: str, values: Tensor) -> None:
     if values.ndim != 2:
         raise ValueError(f"{name}: expected (H, W), received {tuple(values.shape)}")
-
-
-def _encode(image: Image.Image) -> bytes:
-    stream = io.BytesIO()
-    image.save(stream, "PNG")
-    return stream.getvalue()

@@ -27,7 +27,7 @@ from PIL import Image
 from langflash_core.base.files import make_folder, write_atomically
 from langflash_core.base.formats import SOG_FOLDER
 from langflash_core.base.limits import FILES, GAUSSIANS
-from langflash_core.base.picture_files import opened_picture
+from langflash_core.base.picture_files import encoded, opened_picture
 from langflash_core.errors import OutputError, SceneFileError
 from langflash_core.export.packing import check_some, error_line, from_smallest_three, morton_order
 from langflash_core.export.quantised import Palette, quantise
@@ -240,8 +240,6 @@ def _picture(values: np.ndarray, width: int | None = None) -> bytes:
     pixels = np.zeros((height * width, 4), np.uint8)
     pixels[:, 3] = 255
     pixels[:count, : values.shape[1]] = values
-    packed = io.BytesIO()
     # `exact` keeps colours where alpha is 0.
-    picture = Image.fromarray(pixels.reshape(height, width, 4))
-    picture.save(packed, "WEBP", lossless=True, exact=True, method=4, quality=80)
-    return packed.getvalue()
+    options = {"lossless": True, "exact": True, "method": 4, "quality": 80}
+    return encoded(pixels.reshape(height, width, 4), "WEBP", **options)

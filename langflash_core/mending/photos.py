@@ -7,14 +7,11 @@ pixels.
 Sizes: H W pixels of a view, h w of its photo.
 """
 
-import io
-
 import cv2
 import numpy as np
 from jaxtyping import Bool, Float, UInt8
-from PIL import Image
 
-from langflash_core.base.picture_files import decoded_photo
+from langflash_core.base.picture_files import decoded_photo, encoded
 from langflash_core.errors import SceneFileError
 from langflash_core.export.png import to_8bit
 from langflash_core.mending.settings import HIDDEN_PHOTOS
@@ -55,9 +52,7 @@ def painted_over(scene: Scene, view: int, mask: Bool[np.ndarray, "H W"], render:
     covered = blurred > HIDDEN_PHOTOS.rounded
     shown = _render_as_photo(scene, scene.camera(view, width, height), render)
     painted = np.where(covered[..., None], shown, photo)
-    stream = io.BytesIO()
-    Image.fromarray(painted).save(stream, "JPEG", quality=HIDDEN_PHOTOS.quality)
-    return stream.getvalue()
+    return encoded(painted, "JPEG", quality=HIDDEN_PHOTOS.quality)
 
 
 def not_in_scene(scene: Scene, view: int, render: Render) -> Bool[np.ndarray, "H W"]:

@@ -14,10 +14,9 @@ from pathlib import Path
 from typing import Any
 from urllib.parse import quote
 
-from PIL import Image
-
 from langflash_core.base.colormaps import HeatColours
 from langflash_core.base.files import make_folder, write_atomically
+from langflash_core.base.picture_files import encoded
 from langflash_core.errors import InputError
 from langflash_core.export.answers import answer_fields, file_names
 from langflash_core.export.png import USUAL, heat_over, to_8bit
@@ -90,9 +89,7 @@ def ask_scene(
         view, result = best[place]
         answer, picture = kept_of(result)[place], f"{PICTURES}/{own}.jpg"
         shown = heat_over(result.relevance[place], result.frame.rgb, answer.threshold, result.mode, colours)
-        stream = io.BytesIO()
-        Image.fromarray(to_8bit(shown)).save(stream, "JPEG", quality=88)
-        write_atomically(folder / picture, stream.getvalue())
+        write_atomically(folder / picture, encoded(to_8bit(shown), "JPEG", quality=88))
         photos = scene.record.photos
         photo = photos[view] if view < len(photos) else ""
         replies.append(Reply(name, answer, view, photo, scene.record.metric_scale, picture))

@@ -1,14 +1,13 @@
 """Small pictures of things, cut out of the photos that show them best."""
 
 import base64
-import io
 
 import numpy as np
 import torch
 from PIL import Image
 from torch.nn import functional as F
 
-from langflash_core.base.picture_files import decoded_photo
+from langflash_core.base.picture_files import decoded_photo, encoded
 from langflash_core.base.running import Progress
 from langflash_core.export.png import to_8bit
 from langflash_core.inventory.things import Inventory
@@ -32,9 +31,7 @@ def cutouts_of(found: Inventory, renderer: Renderer, progress: Progress) -> dict
             if best[number] == view:
                 picture = _cut_out(photo, seen.mattes[number].cpu())
                 if picture is not None:
-                    stream = io.BytesIO()
-                    picture.save(stream, "WEBP", quality=CUTOUTS.quality)
-                    packed = base64.b64encode(stream.getvalue()).decode()
+                    packed = base64.b64encode(encoded(picture, "WEBP", quality=CUTOUTS.quality)).decode()
                     cutouts[thing.id] = f"data:image/webp;base64,{packed}"
     return cutouts
 
