@@ -11,7 +11,7 @@ import io
 import json
 import struct
 import zipfile
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 from functools import cache
 from pathlib import Path
@@ -20,7 +20,7 @@ import numpy as np
 import pillow_heif
 from PIL import Image
 
-from langflash_core.errors import OutputError
+from langflash_core.errors import InputError, OutputError
 from langflash_core.export import export, read
 from langflash_core.export.cameras import read_posed
 from langflash_core.geometry.tours import along
@@ -144,6 +144,31 @@ def lied(meta, rng: np.random.Generator):
         inner = inner[key]
     inner[path[-1]] = wrong[rng.integers(0, len(wrong))]
     return meta
+
+
+def damages(files: dict[str, bytes], count: int, seed: int) -> Iterator[tuple[str, bytes]]:
+    rng = np.random.default_rng(seed)
+    names = list(files)
+    for index in range(count):
+        name, other = names[index % len(names)], files[names[rng.integers(0, len(names))]]
+        change = damaged_inside if rng.random() < 0.4 else lambda _, *rest: mutated(*rest)
+        yield name, change(name, files[name], other, rng)
+
+
+def outcome(path: Path) -> str:
+    """ "read" or "refused".
+
+    Raises:
+        AssertionError: what was read is not whole, or the sentence is none. Whatever a reader lets through.
+    """
+    try:
+        reader_of(path)()
+    except InputError as error:
+        sentence = str(error)
+        assert "\n" not in sentence and len(sentence) < 500, sentence
+        assert "; " in sentence or path.name in sentence, sentence
+        return "refused"
+    return "read"
 
 
 @cache

@@ -15,7 +15,7 @@ from PIL import Image
 from langflash_core.export import read
 from tests.export.additions import ADDITIONS, additions, axes_file, files_to_add_to, ply_of
 from tests.export.additions import outcome as outcome_of_addition
-from tests.export.mutations import whole_files
+from tests.export.mutations import damages, outcome, whole_files
 from tests.export.splats import refusal
 
 ROOM = 8 * 2**20  # bytes that any reader may take, beside twice what the file says it holds
@@ -34,6 +34,16 @@ def refused(path: Path) -> tuple[str, int]:
         return sentence, tracemalloc.get_traced_memory()[1]
     finally:
         tracemalloc.stop()
+
+
+def test_mutated_splats_are_read_or_refused(files, tmp_path):
+    """What else is read is damaged by `tests/torture`, and splats by the thousand."""
+    found = set()
+    for name, content in damages(files, 20 * len(files), seed=7):
+        (tmp_path / name).write_bytes(content)
+        found.add(outcome(tmp_path / name))
+        (tmp_path / name).write_bytes(files[name])
+    assert found == {"read", "refused"}
 
 
 @pytest.mark.parametrize(
