@@ -3,12 +3,12 @@ while torch is still being imported."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import overload
 
 import cv2
 import numpy as np
 from jaxtyping import Float, Int, Shaped, UInt8
 
+from langflash_core.base.lazy import Lazy
 from langflash_core.cameras.matching import detect, match_descriptors
 from langflash_core.cameras.retrieval import likeness
 from langflash_core.rig.pairs import likely_pairs
@@ -57,26 +57,7 @@ def match_sources(
     pairs: Sequence[tuple[int, int]] | None = None,
 ) -> KeyPoints:
     """`match_photos` of pictures as JPEG bytes."""
-    return match_photos(_Decoded(sources), check, told, pairs)
-
-
-class _Decoded(Sequence[np.ndarray]):
-    """Pictures (h, w) uint8 of JPEG bytes, each decoded when it is asked for."""
-
-    def __init__(self, sources: tuple[bytes, ...]):
-        self._sources = sources
-
-    def __len__(self) -> int:
-        return len(self._sources)
-
-    @overload
-    def __getitem__(self, index: int) -> np.ndarray: ...
-    @overload
-    def __getitem__(self, index: slice) -> Sequence[np.ndarray]: ...
-    def __getitem__(self, index: int | slice) -> np.ndarray | Sequence[np.ndarray]:
-        return (
-            _Decoded(self._sources[index]) if isinstance(index, slice) else decode_grey(self._sources[index])
-        )
+    return match_photos(Lazy(lambda number: decode_grey(sources[number]), len(sources)), check, told, pairs)
 
 
 def match_photos(
