@@ -39,6 +39,16 @@ def _parts(folder):
     return sorted(folder.glob(".*.part"))
 
 
+def _die_while(code: str, folder: Path) -> None:
+    """A process that ends in what `code` begins, without leaving it: its part stays in the folder, `here`."""
+    begin = (
+        "import os, sys; from pathlib import Path; from langflash_core.base import files\n"
+        "here = Path(sys.argv[1])\n"
+    )
+    subprocess.run([sys.executable, "-c", f"{begin}{code}os._exit(0)", str(folder)], check=True)
+    assert len(_parts(folder)) == 1
+
+
 @pytest.fixture
 def writer(tmp_path):
     """A process in the middle of writing `tmp_path / "scene"`."""
@@ -74,12 +84,7 @@ def test_only_parts_of_this_computer_and_this_program_are_swept_up(tmp_path):
 
 
 def test_a_file_name_with_a_line_break_is_swept_up_too(tmp_path):
-    child = (
-        "import sys, os; from langflash_core.base import files; from pathlib import Path\n"
-        "part = files.part_beside(Path(sys.argv[1]) / 'a\\nb'); part.touch(); os._exit(0)"
-    )
-    subprocess.run([sys.executable, "-c", child, str(tmp_path)], check=True)
-    assert len(_parts(tmp_path)) == 1
+    _die_while("files.part_beside(here / 'a\\nb').touch()\n", tmp_path)
     write_atomically(tmp_path / "other", b"whole")
     assert _parts(tmp_path) == []
 
@@ -110,13 +115,8 @@ def test_no_folder_where_a_file_is(tmp_path):
 
 
 def test_a_folder_of_a_killed_process_is_swept_up(tmp_path):
-    child = (
-        "import sys, os; from langflash_core.base.files import filled_atomically; from pathlib import Path\n"
-        "with filled_atomically(Path(sys.argv[1]) / 'room') as staging:\n"
-        "    (staging / 'scene').touch()\n    os._exit(0)"
-    )
-    subprocess.run([sys.executable, "-c", child, str(tmp_path)], check=True)
-    assert len(_parts(tmp_path)) == 1
+    filling = "with files.filled_atomically(here / 'room') as staging:\n    (staging / 'scene').touch()\n    "
+    _die_while(filling, tmp_path)
     write_atomically(tmp_path / "other", b"whole")
     assert os.listdir(tmp_path) == ["other"]
 
@@ -135,12 +135,7 @@ def test_a_folder_is_held_by_one(tmp_path):
 
 
 def test_a_killed_process_holds_nothing(tmp_path):
-    child = (
-        "import sys, os; from langflash_core.base.files import held_alone; from pathlib import Path\n"
-        "with held_alone(Path(sys.argv[1])):\n    os._exit(0)"
-    )
-    subprocess.run([sys.executable, "-c", child, str(tmp_path)], check=True)
-    assert len(_parts(tmp_path)) == 1
+    _die_while("with files.held_alone(here):\n    ", tmp_path)
     with held_alone(tmp_path):
         assert len(_parts(tmp_path)) == 1
 

@@ -18,6 +18,8 @@ from langflash_core.types import Scene
 from tests.export.splats import random_gaussians
 from tests.scene.test_tour import TOUR
 
+TURN = quats_to_matrices(torch.tensor([0.8, 0.3, -0.4, 0.3], dtype=torch.float64))
+
 
 def two_views(degree: int) -> Scene:
     gaussians = random_gaussians(60, degree)
@@ -44,7 +46,7 @@ def assert_its_views_show_the_same(scene: Scene, moved: Scene, unit: float) -> N
 def test_moving_a_scene_does_not_change_what_its_cameras_see(degree):
     scene = two_views(degree)
     viewmat = torch.eye(4, dtype=torch.float64)
-    viewmat[:3, :3] = quats_to_matrices(torch.tensor([0.8, 0.3, -0.4, 0.3], dtype=torch.float64))
+    viewmat[:3, :3] = TURN
     viewmat[:3, 3] = torch.tensor([2.0, -1, 5], dtype=torch.float64)
     moved = in_world(scene, viewmat, 2.5)
     assert torch.allclose(moved.viewmats[0].double(), viewmat, atol=1e-6)
@@ -54,8 +56,7 @@ def test_moving_a_scene_does_not_change_what_its_cameras_see(degree):
 def test_a_scene_that_is_placed_shows_its_views_the_same():
     key = {"centre": [0.1, 0.2, 0.3], "rotation": [1.0, 0, 0, 0], "reach": 2.0, "fov": 60.0, "span": None}
     scene = two_views(2).with_record(camera_path=(key, {"centre": "nowhere"}))
-    turn = quats_to_matrices(torch.tensor([0.8, 0.3, -0.4, 0.3], dtype=torch.float64)).numpy()
-    origin = np.array([0.5, -1.0, 2.0])
+    turn, origin = TURN.numpy(), np.array([0.5, -1.0, 2.0])
     moved = transform_scene(scene, turn, origin, 2.5)
     assert_its_views_show_the_same(scene, moved, 2.5)
     first, odd = moved.record.camera_path
@@ -70,8 +71,7 @@ def test_a_scene_that_is_placed_shows_its_views_the_same():
 
 def test_stops_and_notes_stay_at_their_things():
     scene = bare_scene(random_gaussians(3), "made").with_record(tour=told_tour(TOUR))
-    turn = quats_to_matrices(torch.tensor([0.8, 0.3, -0.4, 0.3], dtype=torch.float64)).numpy()
-    origin = np.array([0.5, -1.0, 2.0])
+    turn, origin = TURN.numpy(), np.array([0.5, -1.0, 2.0])
     moved = read_tour(transform_scene(scene, turn, origin, 2.5).record.tour)
     assert moved.names == TOUR.names and moved.start == TOUR.start
     for old, new in zip(TOUR.notes, moved.notes, strict=True):
