@@ -45,16 +45,6 @@ def test_gathering_is_the_transpose_of_splatting():
     assert float(totals.max()) > 1  # some Gaussian is seen by more than a pixel's worth
 
 
-def test_shares_stay_shares():
-    gaussians, camera = random_gaussians(80), small_camera()
-    values = torch.rand(24, 32, 4).softmax(-1)
-    sums, totals = backproject(gaussians, camera, values)
-    seen = totals > 1e-4
-    shares = sums[seen] / totals[seen, None]
-    assert bool(seen.any()) and bool((shares >= 0).all())
-    assert torch.allclose(shares.sum(-1), torch.ones(len(shares)), atol=1e-4)
-
-
 def test_values_of_another_size_are_refused(unchecked):
     with pytest.raises(ValueError, match="values: expected"):
         backproject(random_gaussians(3), small_camera(), torch.zeros(24, 31, 2))

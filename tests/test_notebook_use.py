@@ -17,32 +17,18 @@ from langflash_core.__main__ import NAME, find_program
 from langflash_core.base.records import Guess, World
 from langflash_core.base.request import ExportRequest
 from langflash_core.errors import GraphicsError, SceneFileError, ViewError
-from langflash_core.language.spaces import language_space
 from langflash_core.splat import render as reference
-from langflash_core.types import Gaussians, Prediction, Scene, Semantics, Views
+from langflash_core.types import Prediction, Scene, Views
 from langflash_core.writing.renderers import TorchRenderer
+from tests.blobs import three_blobs
 
-PLACES = {"sofa": -1.0, "lamp": 0.0, "bookcase": 1.0}
 LINE = 300  # characters: three lines of a wide terminal; the smallest tensor here prints 1,500
 ROOT = Path(lf.__file__).parents[1]
 
 
 @pytest.fixture(scope="module")
 def room() -> Scene:
-    """Three blobs that answer to their words, seen by two photos."""
-    generator = torch.Generator().manual_seed(0)
-    centres = torch.tensor([[x, 0.2 * x, 3.0] for x in PLACES.values()])
-    means = (centres[:, None] + 0.2 * torch.randn(3, 80, 3, generator=generator)).flatten(0, 1)
-    count = len(means)
-    quats, scales = torch.tensor([1.0, 0, 0, 0]).expand(count, 4), torch.full((count, 3), 0.06)
-    gaussians = Gaussians(means, quats, scales, torch.full((count,), 0.9), torch.zeros(count, 1, 3))
-    ids = torch.arange(3).repeat_interleave(80)[:, None]
-    semantics = Semantics(ids, torch.ones(count, 1), language_space().encode(list(PLACES)), "minilm")
-    K = torch.tensor([[60.0, 0, 48], [0, 60.0, 32], [0, 0, 1]])
-    second = torch.eye(4)
-    second[0, 3] = 0.5
-    views = torch.stack((torch.eye(4), second))
-    return Scene(gaussians, semantics, views, K.expand(2, 3, 3), (96, 64), photos=(bytes(2_000),) * 2)
+    return replace(three_blobs(), photos=(bytes(2_000),) * 2)
 
 
 @pytest.fixture(scope="module")

@@ -13,8 +13,9 @@ from langflash_core.geometry.harmonics import SH_C0
 from langflash_core.language.spaces import language_space
 from langflash_core.scene.instances import instances
 from langflash_core.splat import render
-from langflash_core.types import Camera, Gaussians, Record, Scene, Segments, Semantics
+from langflash_core.types import Camera, Record, Scene, Segments, Semantics
 from tests.app.cli.conftest import HEIGHT, WIDTH, stripes
+from tests.splat.scenes import unturned
 
 COLOURS = torch.tensor([[0.9, 0.1, 0.1], [0.1, 0.9, 0.1], [0.1, 0.1, 0.9]])
 
@@ -27,13 +28,8 @@ def chairs() -> tuple[Scene, torch.Tensor]:
     means = torch.cat([square + place for place in places])
     owner = torch.arange(3).repeat_interleave(len(square))
     count = len(means)
-    gaussians = Gaussians(
-        means,
-        torch.tensor([1.0, 0, 0, 0]).repeat(count, 1),
-        torch.tensor([0.014, 0.014, 0.002]).repeat(count, 1),
-        torch.full((count,), 0.95),
-        ((COLOURS[owner] - 0.5) / SH_C0)[:, None],
-    )
+    sh = ((COLOURS[owner] - 0.5) / SH_C0)[:, None]
+    gaussians = unturned(means, torch.tensor([0.014, 0.014, 0.002]), 0.95, sh)
     semantics = Semantics(torch.zeros(count, 0).long(), torch.zeros(count, 0), torch.zeros(0, 4), "test")
     K = torch.tensor([[60.0, 0, 40], [0, 60.0, 30], [0, 0, 1.0]])
     return Scene(gaussians, semantics, torch.eye(4)[None], K[None], (80, 60)), owner
@@ -162,18 +158,18 @@ def sized(scene: Scene, words: list[str], parts: list[tuple[torch.Tensor, float,
     scales = torch.cat([torch.tensor([[r, r, 0.1 * r]]).repeat(len(places), 1) for places, r, _ in parts])
     atoms = torch.cat([torch.full((len(places), 1), atom) for places, _, atom in parts])
     count = len(means)
-    gaussians = Gaussians(
-        means,
-        torch.tensor([1.0, 0, 0, 0]).repeat(count, 1),
-        scales,
-        torch.full((count,), 0.99),
-        torch.zeros(count, 1, 3),
-    )
     dictionary = language_space("minilm").encode(words)
     semantics = Semantics(atoms, torch.ones(count, 1), dictionary, "minilm")
     ids = torch.zeros(count, dtype=torch.int64)
     Ks = torch.stack([scene.camera(view, 160, 120).K for view in range(2)])
-    return replace(scene, gaussians=gaussians, semantics=semantics, view_ids=ids, view_size=(160, 120), Ks=Ks)
+    return replace(
+        scene,
+        gaussians=unturned(means, scales, 0.99),
+        semantics=semantics,
+        view_ids=ids,
+        view_size=(160, 120),
+        Ks=Ks,
+    )
 
 
 def square(x: float, y: float, z: float, side: float, step: float) -> torch.Tensor:

@@ -7,6 +7,7 @@ import torch
 
 from langflash_core.base.resources import asset_path, shader_path
 from langflash_core.types import Camera, Gaussians, Record, Scene, Semantics
+from tests.splat.scenes import unturned
 
 
 def test_a_resized_camera_sees_the_same_rays():
@@ -33,10 +34,7 @@ def test_no_atoms_give_an_empty_matrix():
 def made(count: int = 4, **changes) -> Scene:
     """Two views, three atoms; Gaussian i lies at x = i."""
     means = torch.arange(count)[:, None] * torch.tensor([1.0, 0, 0])
-    quats = torch.tensor([1.0, 0, 0, 0]).repeat(count, 1)
-    gaussians = Gaussians(
-        means, quats, torch.ones(count, 3), torch.linspace(0, 1, count), torch.zeros(count, 1, 3)
-    )
+    gaussians = replace(unturned(means, 1.0), opacities=torch.linspace(0, 1, count))
     semantics = Semantics(torch.arange(count)[:, None] % 3, torch.ones(count, 1), torch.eye(3), "minilm")
     whole = {
         "viewmats": torch.eye(4).repeat(2, 1, 1),

@@ -26,11 +26,7 @@ class Detail:
 
 DETAILS = {
     level.name: level
-    for level in (
-        Detail("low", 0.95, 1e-3, 2),
-        Detail("normal", 2.4, 2e-4, 1),
-        Detail("high", 4.8, 5e-5, 1),
-    )
+    for level in (Detail("low", 0.95, 1e-3, 2), Detail("normal", 2.4, 2e-4, 1), Detail("high", 4.8, 5e-5, 1))
 }
 DEFAULT_DETAIL = "normal"
 EXPORT_DETAILS = ("all", "low")

@@ -252,10 +252,8 @@ def _remove(temporary: Path) -> None:
     if os.path.isdir(temporary) and not os.path.islink(temporary):
         shutil.rmtree(temporary, ignore_errors=True)
         return
-    try:
+    with suppress(OSError):
         temporary.unlink(missing_ok=True)
-    except OSError:
-        return
 
 
 # --- what a command checks before its work ---------------------------------------------------------

@@ -147,11 +147,7 @@ def _check_phrases(request: ExportRequest) -> None:
     """
     if request.threshold is not None and not request.prompts:
         raise PromptError('--threshold needs a phrase; add --prompt "armchair"')
-    wanted = (
-        SEGMENTED if request.segmented else output_of(request.output, request.what, bool(request.prompts))
-    )
-    if wanted is None:
-        wanted = next(output for output in OUTPUTS if output.word == request.what)
+    wanted = request._found or next(output for output in OUTPUTS if output.word == request.what)
     said = f"--what {request.what}" if request.what else wanted.noun
     if wanted.needs_phrases and not request.prompts:
         raise PromptError(f'{said} needs a phrase; add --prompt "armchair"')
@@ -167,22 +163,18 @@ def _check_options(request: ExportRequest, kind: Output) -> None:
             raise InputError(f"--{name} is for videos; name an .mp4 or .webp, or leave it out")
     if not kind.colours and (request.span is not None or request.colormap != COLOUR_MAPS[0]):
         raise InputError("--colormap and --span colour heat-maps; add --what heat, or leave them out")
-    if request.with_text and kind.subject != "page":
-        raise InputError("--with-text is for web pages; name an .html, or leave it out")
-    if request.beside and kind.subject != "page":
-        raise InputError("--beside is for web pages; name an .html, or leave it out")
+    for name in ("with_text", "beside"):
+        if getattr(request, name) and kind.subject != "page":
+            raise InputError(f"--{name.replace('_', '-')} is for web pages; name an .html, or leave it out")
     if request.detail == "low" and not kind.splats:
         raise InputError("--detail low is for splats, scenes and web pages; name one, or leave it out")
     if request.upright and kind.subject not in ("scene", "photos"):
         raise InputError("--upright is for splats, scenes and poses of photos; name one, or leave it out")
-    if request.axes and not any(map(request.axes_of, (request.output, *_read_by(request)))):
+    read = (*filter(None, [request.scene]), *request.beside)
+    if request.axes and not any(map(request.axes_of, (request.output, *read))):
         raise InputError("--axes is for .spz files, read or written; name one, or leave it out")
     if request.fill and not (kind.fills and (kind.phrases == "one" or not request.prompts)):
         raise InputError("--fill is for pictures and films of the whole scene and heat-maps; leave it out")
-
-
-def _read_by(request: ExportRequest) -> tuple[Path, ...]:
-    return (*filter(None, [request.scene]), *request.beside)
 
 
 def _check_camera(request: ExportRequest, kind: Output) -> None:

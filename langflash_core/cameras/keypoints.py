@@ -3,13 +3,13 @@ while torch is still being imported."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
-from typing import overload
 
 import cv2
 import numpy as np
 from jaxtyping import Float, Int, Shaped, UInt8
 
-from langflash_core.cameras.matching import detect, match_descriptors
+from langflash_core.base.lazy import Lazy
+from langflash_core.cameras.matching import at_side, detect, match_descriptors
 from langflash_core.cameras.retrieval import likeness
 from langflash_core.rig.pairs import likely_pairs
 from langflash_core.rig.settings import MATCHING
@@ -57,26 +57,7 @@ def match_sources(
     pairs: Sequence[tuple[int, int]] | None = None,
 ) -> KeyPoints:
     """`match_photos` of pictures as JPEG bytes."""
-    return match_photos(_Decoded(sources), check, told, pairs)
-
-
-class _Decoded(Sequence[np.ndarray]):
-    """Pictures (h, w) uint8 of JPEG bytes, each decoded when it is asked for."""
-
-    def __init__(self, sources: tuple[bytes, ...]):
-        self._sources = sources
-
-    def __len__(self) -> int:
-        return len(self._sources)
-
-    @overload
-    def __getitem__(self, index: int) -> np.ndarray: ...
-    @overload
-    def __getitem__(self, index: slice) -> Sequence[np.ndarray]: ...
-    def __getitem__(self, index: int | slice) -> np.ndarray | Sequence[np.ndarray]:
-        return (
-            _Decoded(self._sources[index]) if isinstance(index, slice) else decode_grey(self._sources[index])
-        )
+    return match_photos(Lazy(lambda number: decode_grey(sources[number]), len(sources)), check, told, pairs)
 
 
 def match_photos(
@@ -96,7 +77,7 @@ def match_photos(
     for number, grey in enumerate(greys):
         check()
         told("key points of photos", number, len(greys))
-        own_positions, own_descriptors = detect(_working_size(grey), limit)
+        own_positions, own_descriptors = detect(at_side(grey, MATCHING.working_side), limit)
         positions.append(own_positions)
         descriptors.append(own_descriptors)
     if pairs is None:
@@ -114,12 +95,3 @@ def decode_grey(source: bytes) -> UInt8[np.ndarray, "h w"]:
     grey = cv2.imdecode(np.frombuffer(source, np.uint8), cv2.IMREAD_GRAYSCALE)
     assert grey is not None, "sources are JPEG bytes that images/ wrote"
     return grey
-
-
-def _working_size(grey: np.ndarray) -> np.ndarray:
-    """Small pictures are enlarged: SIFT needs pixels to find more than a handful of points."""
-    ratio = MATCHING.working_side / max(grey.shape)
-    if ratio == 1:
-        return grey
-    method = cv2.INTER_CUBIC if ratio > 1 else cv2.INTER_AREA
-    return cv2.resize(grey, None, fx=ratio, fy=ratio, interpolation=method)

@@ -65,6 +65,14 @@ class RelativePose:
         return pose
 
 
+def at_side(grey: UInt8[np.ndarray, "H W"], side: int) -> UInt8[np.ndarray, "h w"]:
+    """A picture whose longer side is `side`. Small ones are enlarged: SIFT needs pixels to find more than a
+    handful of points."""
+    ratio = side / max(grey.shape)
+    method = cv2.INTER_AREA if ratio < 1 else cv2.INTER_CUBIC
+    return cv2.resize(grey, None, fx=ratio, fy=ratio, interpolation=method)
+
+
 def detect(
     grey: UInt8[np.ndarray, "H W"], num_features: int = MATCHING.features
 ) -> tuple[Float[np.ndarray, "n 2"], Float[np.ndarray, "n 128"]]:

@@ -11,7 +11,7 @@ import cv2
 import numpy as np
 from jaxtyping import UInt8
 
-from langflash_core.cameras.matching import detect, match_descriptors
+from langflash_core.cameras.matching import at_side, detect, match_descriptors
 from langflash_core.rig.settings import FILM_PAIR
 
 
@@ -25,7 +25,7 @@ def choose_pair(
     features = []
     for grey in greys:
         check()
-        features.append(detect(_resize_to_working_side(grey), FILM_PAIR.features))
+        features.append(detect(at_side(grey, FILM_PAIR.side), FILM_PAIR.features))
     best, chosen = 0.0, None
     for i, j in combinations(range(len(greys)), 2):
         check()
@@ -33,12 +33,6 @@ def choose_pair(
         if worth > best:
             best, chosen = worth, (i, j)
     return chosen
-
-
-def _resize_to_working_side(grey: np.ndarray) -> np.ndarray:
-    ratio = FILM_PAIR.side / max(grey.shape)
-    method = cv2.INTER_AREA if ratio < 1 else cv2.INTER_CUBIC
-    return cv2.resize(grey, None, fx=ratio, fy=ratio, interpolation=method)
 
 
 def _worth(

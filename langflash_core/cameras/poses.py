@@ -17,21 +17,10 @@ from langflash_core.cameras.adjustment import (
 )
 from langflash_core.cameras.alignment import NO_CORRECTION, Correction, fit_correction
 from langflash_core.cameras.graph import Placed, place_views
-from langflash_core.cameras.inputs import (
-    PoseInput,
-    dense_matches,
-    depths_at,
-    key_point_matches,
-    with_dense,
-)
+from langflash_core.cameras.inputs import PoseInput, dense_matches, depths_at, key_point_matches, with_dense
 from langflash_core.cameras.keypoints import KeyPoints
 from langflash_core.cameras.known import agreeing, count_explained, depth_scales, doubt, log_scales
-from langflash_core.cameras.matching import (
-    Matches,
-    RelativePose,
-    relative_pose,
-    triangulate,
-)
+from langflash_core.cameras.matching import Matches, RelativePose, relative_pose, triangulate
 from langflash_core.rig.pairs import bridges, scores_of, strongest
 from langflash_core.rig.settings import ADJUSTMENT, MATCHING, PAIRING, Pairing
 
@@ -95,33 +84,30 @@ def estimate_poses(
     told = {edge: rows for edge, rows in points.pairs.items() if not _blank(points, edge)}
     points = replace(points, pairs=told)
     if known is None and num_views >= ADJUSTMENT.fewest:
-        return _together(views, points, sought or given_lenses(num_views), check, settings=settings)
-    edges = _edges(views, points, settings=settings)
+        return _together(views, points, sought or given_lenses(num_views), check, settings)
+    edges = _edges(views, points, settings)
     if known is None:
-        pairs, agreed = _pair_poses(views, edges, check, settings=settings)
+        pairs, agreed = _pair_poses(views, edges, check, settings)
         found = place_views(num_views, pairs, settings.graph)
-        return _of_pairs(views, found, {edge: agreed[edge] for edge in found.kept}, settings=settings)
+        return _of_pairs(views, found, {edge: agreed[edge] for edge in found.kept}, settings)
     agreed = {}
     for (i, j), matches in edges.items():
         check()
         agreed[i, j] = _agreeing_matches(
-            views[i], views[j], matches, known[j] @ np.linalg.inv(known[i]), settings=settings
+            views[i], views[j], matches, known[j] @ np.linalg.inv(known[i]), settings
         )
     scales = _known_scales(views, known, agreed)
-    found = _of_pairs(views, Placed(known, scales, (), tuple(agreed)), agreed, settings=settings)
-    return replace(found, doubt=_doubt(views, edges, known, settings=settings))
+    found = _of_pairs(views, Placed(known, scales, (), tuple(agreed)), agreed, settings)
+    return replace(found, doubt=_doubt(views, edges, known, settings))
 
 
 def _doubt(
-    views: list[PoseInput],
-    edges: dict[tuple[int, int], Matches],
-    known: np.ndarray,
-    settings: Pairing = PAIRING,
+    views: list[PoseInput], edges: dict[tuple[int, int], Matches], known: np.ndarray, settings: Pairing
 ) -> str:
     """What is wrong with known poses, by the pairs of photos that share most; nothing where they fit."""
     pairs = []
     for i, j in sorted(edges, key=lambda edge: (-len(edges[edge]), edge))[: settings.checked]:
-        sought = _pair_pose(views[i], views[j], edges[i, j], settings=settings)
+        sought = _pair_pose(views[i], views[j], edges[i, j], settings)
         if sought is not None:
             pairs.append(
                 (count_explained(edges[i, j], known[j] @ np.linalg.inv(known[i])), sought.num_inliers)
@@ -129,21 +115,16 @@ def _doubt(
     return doubt(pairs)
 
 
-def _of_pairs(views: list[PoseInput], found: Placed, agreed: Agreed, settings: Pairing = PAIRING) -> Poses:
+def _of_pairs(views: list[PoseInput], found: Placed, agreed: Agreed, settings: Pairing) -> Poses:
     """Corrections from the matches of pairs."""
     corrections = tuple(
-        _correction(v, own, found.viewmats, found.scales[v], agreed, settings=settings)
-        for v, own in enumerate(views)
+        _correction(v, own, found.viewmats, found.scales[v], agreed, settings) for v, own in enumerate(views)
     )
     return Poses(found.viewmats, found.scales, corrections, found.missing)
 
 
 def _together(
-    views: list[PoseInput],
-    points: KeyPoints,
-    sought: Sought,
-    check: Callable[[], None],
-    settings: Pairing = PAIRING,
+    views: list[PoseInput], points: KeyPoints, sought: Sought, check: Callable[[], None], settings: Pairing
 ) -> Poses:
     """Poses of three views and more, and lenses.
 
@@ -152,25 +133,23 @@ def _together(
     """
     growths, solved = np.ones(len(views)), None
     if max(sought.doubts) > 0:
-        few = _few(len(views), points.counts, settings=settings)
-        first = _solve_poses(*_part(views, points, sought, few), check, settings=settings)
+        few = _few(len(views), points.counts, settings)
+        first = _solve_poses(*_part(views, points, sought, few), check, settings)
         bent = _bent_lenses(first[2])
         if bent:
             return Poses.of_bent(bent, len(views))
         sought = replace(sought, bends=False)
-        growths = _other_lenses(first[2], sought, settings=settings)
+        growths = _other_lenses(first[2], sought, settings)
         solved = first if len(few) == len(views) and (growths == 1).all() else None
     seen = [view.through(growth) for view, growth in zip(views, growths, strict=True)]
-    found, agreed, adjusted = solved or _solve_poses(seen, points, sought, check, settings=settings)
+    found, agreed, adjusted = solved or _solve_poses(seen, points, sought, check, settings)
     if (growths != 1).any() and (adjusted is None or None in adjusted.lenses):  # all of them tell it no more
-        return _together(
-            views, points, replace(sought, doubts=(0.0,) * len(sought.doubts)), check, settings=settings
-        )
+        return _together(views, points, replace(sought, doubts=(0.0,) * len(sought.doubts)), check, settings)
     if adjusted is None:
-        return _of_pairs(views, found, agreed, settings=settings)
+        return _of_pairs(views, found, agreed, settings)
     adjusted = adjusted.after(growths, sought.lenses)
     seen = [view.through(growth) for view, growth in zip(views, adjusted.growths, strict=True)]
-    return _of_adjusted(adjusted, seen, found.missing, settings=settings)
+    return _of_adjusted(adjusted, seen, found.missing, settings)
 
 
 def _bent_lenses(adjusted: Adjusted | None) -> tuple[FoundFocal | None, ...]:
@@ -180,29 +159,23 @@ def _bent_lenses(adjusted: Adjusted | None) -> tuple[FoundFocal | None, ...]:
 
 
 def _solve_poses(
-    views: list[PoseInput],
-    points: KeyPoints,
-    sought: Sought,
-    check: Callable[[], None],
-    settings: Pairing = PAIRING,
+    views: list[PoseInput], points: KeyPoints, sought: Sought, check: Callable[[], None], settings: Pairing
 ) -> tuple[Placed, Agreed, Adjusted | None]:
     """Poses by pairs, the matches that agree with them, and what all say together."""
-    edges = _edges(views, points, settings=settings)
-    pairs, agreed = _pair_poses(views, edges, check, settings=settings)
+    edges = _edges(views, points, settings)
+    pairs, agreed = _pair_poses(views, edges, check, settings)
     found = place_views(len(views), pairs, settings.graph)
     agreed = {edge: agreed[edge] for edge in found.kept}
     return found, agreed, adjusted_photos(views, points, found, agreed, sought, check, settings.adjustment)
 
 
-def _edges(
-    views: list[PoseInput], points: KeyPoints, settings: Pairing = PAIRING
-) -> dict[tuple[int, int], Matches]:
+def _edges(views: list[PoseInput], points: KeyPoints, settings: Pairing) -> dict[tuple[int, int], Matches]:
     """Matches of the pairs to look at: those of each photo with the most, and a tree that connects all."""
     chosen = sorted(strongest(scores_of(len(views), points.counts), settings.graph.sources))
     return {edge: key_point_matches(views, points, *edge) for edge in chosen}
 
 
-def _few(num_views: int, counts: Mapping[tuple[int, int], int], settings: Pairing = PAIRING) -> list[int]:
+def _few(num_views: int, counts: Mapping[tuple[int, int], int], settings: Pairing) -> list[int]:
     """Views that tell a lens best: each shares enough with one before it, and no more than it must."""
     if num_views <= settings.first:
         return list(range(num_views))
@@ -232,7 +205,7 @@ def _part(
     return [views[v] for v in few], own, replace(sought, lenses=tuple(sought.lenses[v] for v in few))
 
 
-def _other_lenses(adjusted: Adjusted | None, sought: Sought, settings: Pairing = PAIRING) -> np.ndarray:
+def _other_lenses(adjusted: Adjusted | None, sought: Sought, settings: Pairing) -> np.ndarray:
     """By what focal lengths (V,) grow that were said much too wrongly; 1 of all others."""
     growths = np.ones(len(sought.doubts))
     for lens, found in enumerate(adjusted.lenses if adjusted else ()):
@@ -244,11 +217,11 @@ def _other_lenses(adjusted: Adjusted | None, sought: Sought, settings: Pairing =
 def on_other_maps(poses: Poses, views: Sequence[PoseInput], settings: Pairing = PAIRING) -> Poses:
     """The poses with other depth maps of the same photos, and the unit of view 0's."""
     assert poses.adjusted is not None, "lenses are found where photos are adjusted together"
-    return _of_adjusted(poses.adjusted, views, poses.guessed, settings=settings)
+    return _of_adjusted(poses.adjusted, views, poses.guessed, settings)
 
 
 def _of_adjusted(
-    adjusted: Adjusted, views: Sequence[PoseInput], guessed: tuple[int, ...], settings: Pairing = PAIRING
+    adjusted: Adjusted, views: Sequence[PoseInput], guessed: tuple[int, ...], settings: Pairing
 ) -> Poses:
     """Scales and corrections of the depth maps from the points that many photos saw.
 
@@ -289,7 +262,7 @@ def _pair_poses(
     views: list[PoseInput],
     edges: dict[tuple[int, int], Matches],
     check: Callable[[], None],
-    settings: Pairing = PAIRING,
+    settings: Pairing,
 ) -> tuple[dict[tuple[int, int], RelativePose], dict[tuple[int, int], Matches]]:
     """Relative poses of pairs and the matches that agree with them.
 
@@ -301,7 +274,7 @@ def _pair_poses(
     agreed: dict[tuple[int, int], Matches] = {}
     for (i, j), matches in edges.items():
         check()
-        pose = _pair_pose(views[i], views[j], matches, settings=settings)
+        pose = _pair_pose(views[i], views[j], matches, settings)
         if pose is not None:
             (pairs if pose.num_inliers >= settings.few else weak)[i, j] = pose
             agreed[i, j] = matches.subset(pose.inliers)
@@ -310,7 +283,7 @@ def _pair_poses(
         for i, j in bridges(scores_of(len(views), counts), pairs):
             check()
             more = with_dense(edges[i, j], dense_matches(views[i], views[j]))
-            better = _pair_pose(views[i], views[j], more, settings=settings)
+            better = _pair_pose(views[i], views[j], more, settings)
             if better is not None and better.cost < settings.dense_cost:
                 pairs[i, j], agreed[i, j] = better, more.subset(better.inliers)
             elif (i, j) in weak:
@@ -321,7 +294,7 @@ def _pair_poses(
 
 
 def _agreeing_matches(
-    view_i: PoseInput, view_j: PoseInput, matches: Matches, relative: np.ndarray, settings: Pairing = PAIRING
+    view_i: PoseInput, view_j: PoseInput, matches: Matches, relative: np.ndarray, settings: Pairing
 ) -> Matches:
     """Matches that a known relative pose allows; dense ones as well where few do."""
     own = agreeing(matches, relative)
@@ -344,7 +317,7 @@ def _known_scales(
 
 
 def _pair_pose(
-    view_i: PoseInput, view_j: PoseInput, matches: Matches, settings: Pairing = PAIRING
+    view_i: PoseInput, view_j: PoseInput, matches: Matches, settings: Pairing
 ) -> RelativePose | None:
     """The pose of the matches, if enough of them agree with it."""
     pose = relative_pose(matches, depths_at(view_i, matches.x_i), depths_at(view_j, matches.x_j))
@@ -357,7 +330,7 @@ def _correction(
     viewmats: np.ndarray,
     scale: float,
     agreed: dict[tuple[int, int], Matches],
-    settings: Pairing = PAIRING,
+    settings: Pairing,
 ) -> Correction:
     """What the matches with all other views say of one depth map."""
     points, targets, sigmas = [], [], []

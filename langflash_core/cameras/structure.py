@@ -48,11 +48,7 @@ def is_other_lens(poses: Poses) -> bool:
 
 
 def rescale_poses(
-    poses: Poses,
-    views: Views,
-    Ks: Float[Tensor, "V 3 3"],
-    prior: DepthMaps,
-    local: Float[Tensor, "V C h w"],
+    poses: Poses, views: Views, Ks: Float[Tensor, "V 3 3"], prior: DepthMaps, local: Float[Tensor, "V C h w"]
 ) -> Poses:
     """The same poses for other depth of the same photos, and its unit; arguments as `find_poses`."""
     return on_other_maps(poses, _pose_inputs(Ks, views.size, prior, local))

@@ -90,14 +90,6 @@ def source_picture(views: Views, view: int) -> Tensor:
     return _decode_photo(views.sources[view])
 
 
-def source_size(views: Views, view: int) -> tuple[int, int]:
-    """(height, width) of the largest version of one photo at hand; nothing is decoded."""
-    if not views.sources:
-        return views.size[1], views.size[0]
-    with opened_picture(views.sources[view], STORED) as picture:
-        return picture.height, picture.width
-
-
 def cropped_intrinsics(K: Tensor, box: Box, size: tuple[int, int]) -> Tensor:
     """K (3, 3) of the picture that shows `box` at `size` (width, height)."""
     left, top, right, bottom = box

@@ -24,7 +24,7 @@ from langflash_core.scene.world import in_world
 from langflash_core.surface.assemble import assemble
 from langflash_core.surface.fine import coloured_scene, covered_scene
 from langflash_core.surface.prune import prune
-from langflash_core.types import Cost, FoundLens, Prediction, Scene, Views
+from langflash_core.types import Cost, FoundLens, Scene, Views
 
 # Where each begins in the whole, from its measured share of the time on two CPU cores.
 STAGES = {"photos": 0.0, "weights": 0.08, "network": 0.16, "assemble": 0.66, "level": 0.98}
@@ -37,24 +37,19 @@ def scene_of(options: Options, run: Run, networks: Networks, ahead: Ahead | None
     nothing of it runs on."""
     try:
         options = options.settled()
-        ahead = ahead or _start_ahead(options, run)
+        ahead = ahead or begin(
+            options.photos,
+            preset=options.preset,
+            weights=options.weights,
+            size=options.size,
+            read_weights=False,
+            check=run.check,
+            keep=options.keep,
+        )
         return _make_scene(options, run, networks, ahead)
     finally:
         if ahead is not None:
             ahead.end()
-
-
-def _start_ahead(options: Options, run: Run) -> Ahead:
-    """What can be done beside the rest."""
-    return begin(
-        options.photos,
-        preset=options.preset,
-        weights=options.weights,
-        size=options.size,
-        read_weights=False,
-        check=run.check,
-        keep=options.keep,
-    )
 
 
 def _make_scene(options: Options, run: Run, networks: Networks, ahead: Ahead) -> Scene:
@@ -64,7 +59,9 @@ def _make_scene(options: Options, run: Run, networks: Networks, ahead: Ahead) ->
     if lenses:
         scene = scene.with_record(lens={"found": [asdict(lens) for lens in lenses]})
     run.check()
-    scene = _in_world(options, scene)
+    if options.viewmats is not None:
+        assert scene.record.network_unit is not None, "`assemble` records it"
+        scene = in_world(scene, options.viewmats[0], scene.record.network_unit)
     with run.stage("level"):
         scene = level_scene(scene.with_record(calibration=dict(tools.network.calibration)))
     run.report("done", 1.0)
@@ -106,20 +103,13 @@ def _wait_for_matches(ahead: Ahead, run: Run) -> None:
             told(f"weights: {ahead.matching}", ahead.matching.share)
 
 
-def _find_scene(
-    options: Options, run: Run, ahead: Ahead, tools: Tools, views: Views
-) -> tuple[Prediction, Views]:
-    """What the network finds, and the views as it has them now."""
-    with run.stage("network"):
-        prediction, views = straight_prediction(predictor(options, tools, ahead, run), views)
-        return prediction, found_views(views, prediction)
-
-
 def _assemble_scene(
     options: Options, run: Run, ahead: Ahead, tools: Tools, views: Views
 ) -> tuple[Scene, tuple[FoundLens, ...]]:
     """The scene, and the lenses found."""
-    prediction, views = _find_scene(options, run, ahead, tools, views)
+    with run.stage("network"):
+        prediction, views = straight_prediction(predictor(options, tools, ahead, run), views)
+        views = found_views(views, prediction)
     lenses = prediction.lenses
     with run.stage("assemble"), torch.no_grad():
         if tools.finer is None:
@@ -129,24 +119,11 @@ def _assemble_scene(
             return prune(assemble(prediction, views, preset=options.preset)), lenses
         told = run.within("assemble")
         covered = covered_scene(
-            prediction,
-            views,
-            tools.finer,
-            gaussians=options.gaussians,
-            preset=options.preset,
-            progress=told,
-        )
+            prediction, views, tools.finer,
+            gaussians=options.gaussians, preset=options.preset, progress=told,
+        )  # fmt: skip
         del prediction  # five megabytes a photo that nobody asks for any more
         return coloured_scene(covered, told), lenses
-
-
-def _in_world(options: Options, scene: Scene) -> Scene:
-    """The scene in the world of the poses that were given."""
-    if options.viewmats is None:
-        return scene
-    unit = scene.record.network_unit
-    assert unit is not None, "`assemble` records it"
-    return in_world(scene, options.viewmats[0], unit)
 
 
 def _with_cost(scene: Scene, timings: dict[str, float]) -> Scene:

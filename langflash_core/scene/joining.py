@@ -1,6 +1,7 @@
 """Two scenes as one: the second's Gaussians and atoms behind the first's, in the first's world."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
+from typing import Any
 
 import torch
 from torch import Tensor
@@ -11,14 +12,6 @@ from langflash_core.scene.changes import Moved, Spot
 from langflash_core.scene.mask import Mask
 from langflash_core.scene.settings import JOINING
 from langflash_core.types import NO_LANGUAGE, Gaussians, Scene, Semantics
-
-
-@dataclass(frozen=True)
-class _Box:
-    """low, high (3,): where nearly all of a scene's Gaussians are."""
-
-    low: Tensor
-    high: Tensor
 
 
 def join_scenes(
@@ -83,11 +76,9 @@ def _behind(first: Scene, second: Scene, view_ids: Tensor | None) -> Scene:
     after, ours, theirs = first.semantics.num_atoms, first.record, second.record
     scene = replace(
         first,
-        gaussians=_stack_gaussians(first.gaussians, second.gaussians),
+        **_rows_of_both(first, second),
         semantics=_joined_semantics(first.semantics, second.semantics),
         view_ids=view_ids,
-        levels=_known_of_both(first, second, first.levels, second.levels, 0),
-        confidences=_known_of_both(first, second, first.confidences, second.confidences, 1),
         record=replace(ours, atom_names={}, atom_denials={}, silent_atoms=(), lone_atoms=()),
     )
     return scene.with_record(
@@ -122,20 +113,21 @@ def append_part(scene: Scene, part: Scene) -> Scene:
     if scene.view_ids is not None:
         unknown = scene.view_ids.new_full((len(part.gaussians),), -1)
         view_ids = torch.cat((scene.view_ids, unknown if part.view_ids is None else part.view_ids))
-    return replace(
-        scene,
-        gaussians=_stack_gaussians(scene.gaussians, part.gaussians),
-        semantics=semantics,
-        view_ids=view_ids,
-        levels=_known_of_both(scene, part, scene.levels, part.levels, 0),
-        confidences=_known_of_both(scene, part, scene.confidences, part.confidences, 1),
-    )
+    return replace(scene, **_rows_of_both(scene, part), semantics=semantics, view_ids=view_ids)
 
 
-def _known_of_both(
-    first: Scene, second: Scene, ours: Tensor | None, theirs: Tensor | None, unknown: int
-) -> Tensor | None:
+def _rows_of_both(first: Scene, second: Scene) -> dict[str, Any]:
+    """What is known of the rows of both; levels and confidences of the one that knows none are 0 and 1."""
+    return {
+        "gaussians": _stack_gaussians(first.gaussians, second.gaussians),
+        "levels": _known_of_both(first, second, "levels", 0),
+        "confidences": _known_of_both(first, second, "confidences", 1),
+    }
+
+
+def _known_of_both(first: Scene, second: Scene, name: str, unknown: int) -> Tensor | None:
     """(N,) of what one or the other knows, `unknown` for Gaussians of the one that does not."""
+    ours, theirs = getattr(first, name), getattr(second, name)
     known = theirs if ours is None else ours
     if known is None:
         return None
@@ -149,11 +141,11 @@ def beside(first: Scene, second: Scene) -> Moved:
     ratio = 1.0
     if first.record.metric_scale and second.record.metric_scale:
         ratio = second.record.metric_scale / first.record.metric_scale
-    ours, theirs = _box(first.gaussians), _box(second.gaussians)
-    gap = JOINING.gap * float(ours.high[0] - ours.low[0])
-    right = float(ours.high[0]) + gap - ratio * float(theirs.low[0])
-    down = float(ours.high[1]) - ratio * float(theirs.high[1])
-    ahead = float(ours.low[2] + ours.high[2] - ratio * (theirs.low[2] + theirs.high[2])) / 2
+    (low, high), (their_low, their_high) = _box(first.gaussians), _box(second.gaussians)
+    gap = JOINING.gap * float(high[0] - low[0])
+    right = float(high[0]) + gap - ratio * float(their_low[0])
+    down = float(high[1]) - ratio * float(their_high[1])
+    ahead = float(low[2] + high[2] - ratio * (their_low[2] + their_high[2])) / 2
     offset: Spot = (right, down, ahead)
     return Moved(Mask.full(len(second.gaussians)), scale=ratio, offset=offset)
 
@@ -176,24 +168,22 @@ def _check(first: Scene, second: Scene, names: tuple[str, str]) -> None:
         )
 
 
-def _box(gaussians: Gaussians) -> _Box:
+def _box(gaussians: Gaussians) -> tuple[Tensor, Tensor]:
+    """Lowest and highest (3,), between which nearly all Gaussians are."""
     means = gaussians.means.double()
     means = means[torch.isfinite(means).all(-1)]
     if not len(means):
-        return _Box(torch.zeros(3), torch.zeros(3))
+        return torch.zeros(3), torch.zeros(3)
     ordered = means.sort(dim=0).values
     last = len(ordered) - 1
-    return _Box(ordered[round(JOINING.edge * last)], ordered[round((1 - JOINING.edge) * last)])
+    return ordered[round(JOINING.edge * last)], ordered[round((1 - JOINING.edge) * last)]
 
 
 def _stack_gaussians(first: Gaussians, second: Gaussians) -> Gaussians:
     """Both, with as many harmonics as the one that has more; the others' are 0."""
     bases = max(first.sh.shape[1], second.sh.shape[1])
     ours, theirs = (replace(some, sh=_pad_columns(some.sh, bases)) for some in (first, second))
-    pairs = (
-        (getattr(ours, name), getattr(theirs, name))
-        for name in ("means", "quats", "scales", "opacities", "sh")
-    )
+    pairs = zip(vars(ours).values(), vars(theirs).values(), strict=True)
     return Gaussians(*(torch.cat((mine, yours.to(mine))) for mine, yours in pairs))
 
 

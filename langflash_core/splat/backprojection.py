@@ -17,7 +17,7 @@ from torch import Tensor
 from langflash_core.types import Camera, Gaussians
 
 from .projection import ALPHA_MIN, NEAR, Footprints, project
-from .reference import _MAX_PAIRS, _alphas, _Box, _clip, _halves, _pairs, _transmittances
+from .reference import _alphas, _pairs, _rectangles, _transmittances
 
 _PAIRS_AT_ONCE = 1 << 17  # times K floats of memory: 33 MB for K = 64
 
@@ -51,18 +51,8 @@ def backproject(
     flat = torch.cat((values * count[..., None], count[..., None]), -1).flatten(0, 1).float()
     sums = flat.new_zeros(len(gaussians), flat.shape[1])
     footprints = project(gaussians, camera, near)
-    everyone = torch.arange(len(footprints.ids))
-    queue: list[tuple[_Box, Tensor, Tensor]] = [
-        ((0, 0, camera.width, camera.height), everyone, footprints.boxes())
-    ]
-    while queue:
-        box, rows, boxes = queue.pop()
-        rows, clipped, num_pairs = _clip(rows, boxes, box)
-        halves = _halves(box) if num_pairs > _MAX_PAIRS else []
-        if halves:
-            queue.extend((half, rows, clipped) for half in halves)
-        elif num_pairs:
-            _add(sums, flat, footprints, rows, clipped, camera.width)
+    for _, rows, clipped in _rectangles(footprints, (0, 0, camera.width, camera.height)):
+        _add(sums, flat, footprints, rows, clipped, camera.width)
     return sums[:, :-1], sums[:, -1]
 
 

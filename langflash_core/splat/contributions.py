@@ -14,7 +14,7 @@ from torch import Tensor
 from langflash_core.types import Camera, Gaussians
 
 from .projection import ALPHA_MIN, NEAR, Footprints, project
-from .reference import _MAX_PAIRS, _alphas, _Box, _clip, _halves, _pairs, _transmittances
+from .reference import _alphas, _pairs, _rectangles, _transmittances
 
 
 def contributions(
@@ -51,18 +51,10 @@ def contributions(
     (y0, x0), (y1, x1) = asked.amin(0).tolist(), (asked.amax(0) + 1).tolist()
     with torch.no_grad():
         footprints = project(gaussians, camera, near)
-        everyone = torch.arange(len(footprints.ids))
-        queue: list[tuple[_Box, Tensor, Tensor]] = [((x0, y0, x1, y1), everyone, footprints.boxes())]
-        while queue:
-            box, rows, boxes = queue.pop()
-            if not pixels[box[1] : box[3], box[0] : box[2]].any():
-                continue
-            rows, clipped, num_pairs = _clip(rows, boxes, box)
-            halves = _halves(box) if num_pairs > _MAX_PAIRS else []
-            if halves:
-                queue.extend((half, rows, clipped) for half in halves)
-            elif num_pairs:
-                _raise_to(result, footprints, rows, clipped, pixels, through)
+        wanted = lambda box: bool(pixels[box[1] : box[3], box[0] : box[2]].any())  # noqa: E731
+        for _, rows, clipped in _rectangles(footprints, (x0, y0, x1, y1), wanted):
+            _raise_to(result, footprints, rows, clipped, pixels, through)
+    return result
     return result
 
 

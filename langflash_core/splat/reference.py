@@ -14,6 +14,8 @@ whatever the input, restarted at each pixel. 100,000 Gaussians with 24
 atoms at 224 x 224 take 1.3 s on one core where they are 1.2 px wide, 15 s at 4.5 px, below 1 GB.
 """
 
+from collections.abc import Callable, Iterator
+
 import torch
 from jaxtyping import Float
 from torch import Tensor
@@ -91,32 +93,35 @@ def rasterize(
     if features.shape[0] != len(gaussians):
         raise ValueError(f"features: expected {len(gaussians)} rows, received {features.shape[0]}")
     footprints = project(gaussians, camera, near)
-    everyone = torch.arange(len(footprints.ids), device=footprints.ids.device)
     pixels, parts = [], []
-    queue = [((0, 0, camera.width, camera.height), everyone, footprints.boxes())]
+    for box, rows, clipped in _rectangles(footprints, (0, 0, camera.width, camera.height)):
+        index, part = _composite(footprints, features, rows, clipped, box, camera.width)
+        pixels.append(index)
+        parts.append(part)
+    image = features.new_zeros(camera.height * camera.width, features.shape[1] + 1)
+    if pixels:
+        image = image.index_copy(0, torch.cat(pixels), torch.cat(parts))
+    image = image.unflatten(0, (camera.height, camera.width))
+    return image[..., :-1], image[..., -1]
+
+
+def _rectangles(
+    footprints: Footprints, box: _Box, wanted: Callable[[_Box], bool] = lambda box: True
+) -> Iterator[tuple[_Box, Tensor, Tensor]]:
+    """Parts of a rectangle that footprints reach, of few pairs each; rows (k,) of those that do, and their
+    boxes (k, 4) inside it. wanted: whether anybody asks for a part."""
+    everyone = torch.arange(len(footprints.ids), device=footprints.ids.device)
+    queue = [(box, everyone, footprints.boxes())]
     while queue:
         box, rows, boxes = queue.pop()
+        if not wanted(box):
+            continue
         rows, clipped, num_pairs = _clip(rows, boxes, box)
         halves = _halves(box) if num_pairs > _MAX_PAIRS else []
         if halves:
             queue.extend((half, rows, clipped) for half in halves)
         elif num_pairs:
-            index, part = _composite(footprints, features, rows, clipped, box, camera.width)
-            pixels.append(index)
-            parts.append(part)
-    return _assemble(pixels, parts, features, camera)
-
-
-def _assemble(
-    pixels: list[Tensor], parts: list[Tensor], features: Tensor, camera: Camera
-) -> tuple[Tensor, Tensor]:
-    """One image out of the rectangles' pixels; untouched pixels are 0."""
-    num_features = features.shape[1]
-    image = features.new_zeros(camera.height * camera.width, num_features + 1)
-    if pixels:
-        image = image.index_copy(0, torch.cat(pixels), torch.cat(parts))
-    image = image.unflatten(0, (camera.height, camera.width))
-    return image[..., :num_features], image[..., num_features]
+            yield box, rows, clipped
 
 
 def _halves(box: _Box) -> list[_Box]:

@@ -7,7 +7,7 @@ elements of the size that it asks for (`blocks`, `elements`): a layer of its own
 import time
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass
-from typing import TypeVar, overload
+from typing import TypeVar
 
 import torch
 from jaxtyping import Bool, Float
@@ -15,6 +15,7 @@ from torch import Tensor
 from torch.nn import functional as F
 
 from langflash_core.base.detail import Detail
+from langflash_core.base.lazy import Lazy
 from langflash_core.base.memory import give_back
 from langflash_core.geometry.cameras import world_points
 from langflash_core.scene.weights import sparse_weights
@@ -97,7 +98,9 @@ def assemble_detailed(
     if not bool(torch.isfinite(prediction.viewmats).all()):
         raise ValueError("viewmats: expected finite poses, received others")
     known, keep, unit = _valid_depths(prediction, views, transients)
-    sights = _Sights(lambda v: _Sight.of(photos[v], views.images[v], known[v].log(), keep[v]), len(photos))
+    sights = Lazy(
+        lambda v: _Sight.of(photos[v], views.images[v], known[v].log(), keep[v]), len(photos), LAYERS.held
+    )
     budget = gaussians or min(round(detail.most * int(keep.sum())), LAYERS.most_gaussians)
     covers, limit = _covers(sights, detail, budget, 0.0 if gaussians else detail.gain, progress)
     made, weights, parts = _make_gaussians(
@@ -160,30 +163,6 @@ class _Sight:
     @property
     def size(self) -> tuple[int, int]:
         return self.photo.shape[-2], self.photo.shape[-1]
-
-
-class _Sights(Sequence[_Sight]):
-    """What each photo sees; of more than `LAYERS.held` made anew whenever it is asked for."""
-
-    def __init__(self, make: Callable[[int], _Sight], count: int):
-        self._make, self._count = make, count
-        self._known: dict[int, _Sight] = {}
-
-    def __len__(self) -> int:
-        return self._count
-
-    @overload
-    def __getitem__(self, index: int) -> _Sight: ...
-    @overload
-    def __getitem__(self, index: slice) -> Sequence[_Sight]: ...
-    def __getitem__(self, index: int | slice) -> _Sight | Sequence[_Sight]:
-        if isinstance(index, slice):
-            return [self[v] for v in range(*index.indices(self._count))]
-        if index not in self._known:
-            if self._count > LAYERS.held:
-                self._known.clear()
-            self._known[index] = self._make(index)
-        return self._known[index]
 
 
 def _valid_depths(

@@ -7,7 +7,6 @@ import math
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from typing import overload
 
 import torch
 from jaxtyping import Bool
@@ -16,16 +15,17 @@ from torch.nn import functional as F
 
 from langflash_core.base.at_once import at_once
 from langflash_core.base.detail import Detail
+from langflash_core.base.lazy import Lazy
 from langflash_core.base.running import Progress
 from langflash_core.geometry.cameras import invert_rigid
 from langflash_core.geometry.harmonics import colour_to_sh, sh_to_colour
 from langflash_core.geometry.nearness import Nearness
-from langflash_core.images.views import source_picture, source_size
+from langflash_core.images.views import source_picture
 from langflash_core.rig.rig import Rig
 from langflash_core.scene.report import left_out_line
 from langflash_core.surface.assemble import placed_views, rig_of
 from langflash_core.surface.colours import solved_colours
-from langflash_core.surface.detailed import assemble_detailed, working_photo, working_size
+from langflash_core.surface.detailed import assemble_detailed, working_photo
 from langflash_core.surface.exposure_compensation import ExposureCompensation, compensate_exposure
 from langflash_core.surface.foreseen import foresight
 from langflash_core.surface.prune import prune
@@ -43,7 +43,7 @@ class Covered:
     the light of all."""
 
     scene: Scene
-    photos: "_Photos"
+    photos: Sequence[Tensor]
     left: Bool[Tensor, "V H W"]
     light: ExposureCompensation
 
@@ -74,8 +74,7 @@ def covered_scene(
     prediction, views = placed_views(prediction, views)
     rig = rig_of(prediction, views)
     light = compensate_exposure(rig)
-    grid = (views.images.shape[-2], views.images.shape[-1])
-    photos, whole = _Photos(views, light, grid), _Photos(views, light.whole, grid)
+    photos, whole = _lit_photos(views, light), _lit_photos(views, light.whole)
     views = replace(views, images=light.correct_photos(views.images).clamp(0, 1))
     rig = rig_of(prediction, views)  # in the light of all
     left = transient_masks(rig)
@@ -98,8 +97,8 @@ def covered_scene(
 @torch.no_grad()
 def coloured_scene(covered: Covered, progress: Progress = lambda stage, fraction: None) -> Scene:
     """The scene in the colours of all its photos, without what nobody sees; `progress` as `covered_scene`."""
-    solving, left = time.perf_counter(), covered.left
-    silent, light = _Silent(covered.photos, left), covered.light
+    solving, left, light = time.perf_counter(), covered.left, covered.light
+    silent = Lazy(lambda view: _silenced(covered.photos[view], left[view]), len(left))
     scene = _colour_layers(covered.scene, silent, light, lambda done: progress("colours", 0.4 + 0.5 * done))
     timings = {**scene.record.cost.timings, "colours": time.perf_counter() - solving}
     shares = _shares(left)
@@ -111,66 +110,24 @@ def coloured_scene(covered: Covered, progress: Progress = lambda stage, fraction
     return prune(scene, merge=False)
 
 
-class _Photos(Sequence[Tensor]):
-    """Photos (3, h, w) at their working size, in the light of all; of more than `LAYERS.held` each is decoded
-    anew whenever it is asked for."""
+def _lit_photos(views: Views, light: ExposureCompensation) -> Lazy[Tensor]:
+    """Photos (3, h, w) at their working size, in the light of all; many are decoded anew whenever they are
+    asked for."""
+    grid = (views.images.shape[-2], views.images.shape[-1])
 
-    def __init__(self, views: Views, light: ExposureCompensation, grid: tuple[int, int]):
-        self._views, self._light, self._grid = views, light, grid
-        self._known: dict[int, Tensor] = {}
+    def photo(view: int) -> Tensor:
+        own = working_photo(source_picture(views, view), grid)
+        return light.correct_photos(own, view=view).clamp(0, 1)
 
-    def __len__(self) -> int:
-        return self._views.num_views
+    return Lazy(photo, views.num_views, LAYERS.held)
 
-    @overload
-    def __getitem__(self, index: int) -> Tensor: ...
-    @overload
-    def __getitem__(self, index: slice) -> Sequence[Tensor]: ...
-    def __getitem__(self, index: int | slice) -> Tensor | Sequence[Tensor]:
-        if isinstance(index, slice):
-            return [self[v] for v in range(*index.indices(len(self)))]
-        if not 0 <= index < len(self):
-            raise IndexError(index)
-        if index in self._known:
-            return self._known[index]
-        photo = working_photo(source_picture(self._views, index), self._grid)
-        photo = self._light.correct_photos(photo, view=index).clamp(0, 1)
-        if len(self) <= LAYERS.held:
-            self._known[index] = photo
+
+def _silenced(photo: Tensor, left: Tensor) -> Tensor:
+    """A photo (3, h, w) that says nothing, is no number, where `left` (H, W) is."""
+    if not bool(left.any()):
         return photo
-
-    def size(self, index: int) -> tuple[int, int]:
-        """(width, height) of one."""
-        height, width = working_size(source_size(self._views, index), self._grid)
-        return width, height
-
-
-class _Silent(Sequence[Tensor]):
-    """Photos which say nothing, are no numbers, where `left` (V, H, W) is."""
-
-    def __init__(self, photos: _Photos, left: Tensor):
-        self._photos, self._left = photos, left
-        self._some = left.flatten(1).any(1).tolist()
-
-    def __len__(self) -> int:
-        return len(self._photos)
-
-    @overload
-    def __getitem__(self, index: int) -> Tensor: ...
-    @overload
-    def __getitem__(self, index: slice) -> Sequence[Tensor]: ...
-    def __getitem__(self, index: int | slice) -> Tensor | Sequence[Tensor]:
-        if isinstance(index, slice):
-            return [self[v] for v in range(*index.indices(len(self)))]
-        photo = self._photos[index]
-        if not self._some[index]:
-            return photo
-        left = F.interpolate(self._left[index][None, None].float(), size=photo.shape[-2:], mode="nearest")
-        return torch.where(left[0] > 0, torch.nan, photo)
-
-    def size(self, index: int) -> tuple[int, int]:
-        """(width, height) of one."""
-        return self._photos.size(index)
+    there = F.interpolate(left[None, None].float(), size=photo.shape[-2:], mode="nearest")[0] > 0
+    return torch.where(there, torch.nan, photo)
 
 
 def _foreseen(rig: Rig) -> dict[str, list]:
@@ -204,7 +161,7 @@ def _with_layers(prediction: Prediction) -> Bool[Tensor, " V"]:
 
 
 def _colour_layers(
-    scene: Scene, photos: _Silent, light: ExposureCompensation, progress: Callable[[float], None]
+    scene: Scene, photos: Sequence[Tensor], light: ExposureCompensation, progress: Callable[[float], None]
 ) -> Scene:
     """Each photo's layer in the colours that make that photo (3, h, w) again; the record says how near they
     come.
@@ -219,12 +176,12 @@ def _colour_layers(
     starts = torch.searchsorted(scene.view_ids, torch.arange(len(photos) + 1)).tolist()  # in order of views
 
     def solved(view: int) -> tuple[Tensor, float]:
-        rows = slice(starts[view], starts[view + 1])
+        rows, photo = slice(starts[view], starts[view + 1]), photos[view]
         found = solved_colours(
             scene.gaussians.map(lambda values: values[rows]),
             (start[rows] - low) / (high - low),
-            scene.camera(view, *photos.size(view)),
-            photos[view],
+            scene.camera(view, photo.shape[-1], photo.shape[-2]),
+            photo,
         )
         return found.colours, found.psnr[1] + 20 * math.log10(own[view])
 

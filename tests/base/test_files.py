@@ -4,15 +4,18 @@ import errno
 import os
 import subprocess
 import sys
+from pathlib import Path
 
 import pytest
 
 from langflash_core.base.files import (
+    _host,
     check_folder,
     check_output_file,
     filled_atomically,
     held_alone,
     make_folder,
+    move_all,
     staged_folder,
     write_atomically,
     written_atomically,
@@ -34,6 +37,16 @@ write_atomically(Path(sys.argv[1]), parts())
 
 def _parts(folder):
     return sorted(folder.glob(".*.part"))
+
+
+def _die_while(code: str, folder: Path) -> None:
+    """A process that ends in what `code` begins, without leaving it: its part stays in the folder, `here`."""
+    begin = (
+        "import os, sys; from pathlib import Path; from langflash_core.base import files\n"
+        "here = Path(sys.argv[1])\n"
+    )
+    subprocess.run([sys.executable, "-c", f"{begin}{code}os._exit(0)", str(folder)], check=True)
+    assert len(_parts(folder)) == 1
 
 
 @pytest.fixture
@@ -71,12 +84,7 @@ def test_only_parts_of_this_computer_and_this_program_are_swept_up(tmp_path):
 
 
 def test_a_file_name_with_a_line_break_is_swept_up_too(tmp_path):
-    child = (
-        "import sys, os; from langflash_core.base import files; from pathlib import Path\n"
-        "part = files.part_beside(Path(sys.argv[1]) / 'a\\nb'); part.touch(); os._exit(0)"
-    )
-    subprocess.run([sys.executable, "-c", child, str(tmp_path)], check=True)
-    assert len(_parts(tmp_path)) == 1
+    _die_while("files.part_beside(here / 'a\\nb').touch()\n", tmp_path)
     write_atomically(tmp_path / "other", b"whole")
     assert _parts(tmp_path) == []
 
@@ -107,13 +115,8 @@ def test_no_folder_where_a_file_is(tmp_path):
 
 
 def test_a_folder_of_a_killed_process_is_swept_up(tmp_path):
-    child = (
-        "import sys, os; from langflash_core.base.files import filled_atomically; from pathlib import Path\n"
-        "with filled_atomically(Path(sys.argv[1]) / 'room') as staging:\n"
-        "    (staging / 'scene').touch()\n    os._exit(0)"
-    )
-    subprocess.run([sys.executable, "-c", child, str(tmp_path)], check=True)
-    assert len(_parts(tmp_path)) == 1
+    filling = "with files.filled_atomically(here / 'room') as staging:\n    (staging / 'scene').touch()\n    "
+    _die_while(filling, tmp_path)
     write_atomically(tmp_path / "other", b"whole")
     assert os.listdir(tmp_path) == ["other"]
 
@@ -129,16 +132,10 @@ def test_a_folder_is_held_by_one(tmp_path):
     with pytest.raises(FileNotFoundError), held_alone(place):
         (place / "missing").read_bytes()  # of what is done inside, not of the folder
     assert not _parts(place)
-    assert _parts(place) == []
 
 
 def test_a_killed_process_holds_nothing(tmp_path):
-    child = (
-        "import sys, os; from langflash_core.base.files import held_alone; from pathlib import Path\n"
-        "with held_alone(Path(sys.argv[1])):\n    os._exit(0)"
-    )
-    subprocess.run([sys.executable, "-c", child, str(tmp_path)], check=True)
-    assert len(_parts(tmp_path)) == 1
+    _die_while("with files.held_alone(here):\n    ", tmp_path)
     with held_alone(tmp_path):
         assert len(_parts(tmp_path)) == 1
 
@@ -251,3 +248,101 @@ def test_a_link_onto_another_disk(tmp_path, monkeypatch):
     monkeypatch.setattr(os, "replace", moved)
     _staged(link)
     assert target.read_bytes() == b"new" and link.is_symlink() and os.listdir(target.parent) == ["b"]
+
+
+# --- several files at once --------------------------------------------------------------------------
+
+
+def test_folder_is_made_only_at_the_end(tmp_path):
+    target = tmp_path / "a" / "b"
+    with staged_folder(target) as staging:
+        (staging / "x.txt").write_bytes(b"x")
+        (staging / "y.txt").write_bytes(b"y")
+        assert not (tmp_path / "a").exists()
+    assert sorted(os.listdir(target)) == ["x.txt", "y.txt"]
+    assert os.listdir(tmp_path) == ["a"]  # no staging folder is left
+
+
+def test_files_beside_are_kept_and_old_ones_replaced(tmp_path):
+    (tmp_path / "mine.txt").write_bytes(b"mine")
+    (tmp_path / "x.txt").write_bytes(b"a long old content")
+    with staged_folder(tmp_path) as staging:
+        (staging / "x.txt").write_bytes(b"new")
+    assert (tmp_path / "x.txt").read_bytes() == b"new"
+    assert sorted(os.listdir(tmp_path)) == ["mine.txt", "x.txt"]
+
+
+def test_what_is_staged_for_the_folder_one_is_in_lies_in_it(tmp_path, monkeypatch):
+    """Its parent may belong to somebody else."""
+    own = tmp_path / "own"
+    own.mkdir()
+    monkeypatch.chdir(own)
+    with staged_folder(Path("x.txt").parent) as staging:
+        assert staging.resolve().parent == own
+        (staging / "x.txt").write_bytes(b"x")
+    assert os.listdir(own) == ["x.txt"]
+
+
+@pytest.mark.parametrize("stop", [KeyboardInterrupt, ValueError])
+def test_interruption_leaves_nothing(tmp_path, stop):
+    with pytest.raises(stop), staged_folder(tmp_path / "new" / "folder") as staging:
+        (staging / "x.txt").write_bytes(b"x")
+        raise stop
+    assert os.listdir(tmp_path) == []
+
+
+def test_all_or_nothing_when_a_target_is_a_folder(tmp_path):
+    (tmp_path / "b.png").mkdir()
+    with pytest.raises(OutputError, match=r"b\.png"), staged_folder(tmp_path) as staging:
+        (staging / "a.png").write_bytes(b"a")
+        (staging / "b.png").write_bytes(b"b")
+    assert os.listdir(tmp_path) == ["b.png"]
+
+
+def test_failed_move_is_undone(tmp_path):
+    """The second file is gone: the first one's move and its new folders are taken back."""
+    (tmp_path / "a").write_bytes(b"a")
+    target = tmp_path / "new" / "folder"
+    with pytest.raises(OutputError, match="choose another -o"):
+        move_all({tmp_path / "a": target / "a", tmp_path / "gone": target / "gone"})
+    assert not (tmp_path / "new").exists()
+
+
+def test_check_leaves_no_trace(tmp_path):
+    check_folder(tmp_path / "not" / "there" / "yet")
+    assert os.listdir(tmp_path) == []
+
+
+@pytest.mark.skipif(os.name != "posix" or os.geteuid() == 0, reason="root may write everywhere")
+def test_read_only_folder(tmp_path):
+    tmp_path.chmod(0o500)
+    with pytest.raises(OutputError, match="cannot write"):
+        check_folder(tmp_path)
+
+
+def test_output_file(tmp_path):
+    assert check_output_file(tmp_path / "new" / "A.PNG", (".png",)) == tmp_path / "new" / "A.PNG"
+    with pytest.raises(OutputError, match=r"\.png"):
+        check_output_file(tmp_path / "a.jpg", (".png",))
+    with pytest.raises(OutputError, match="rename --sheet"):
+        check_output_file(tmp_path / "a.jpg", (".png",), option="--sheet")
+    with pytest.raises(OutputError, match="folder"):
+        check_output_file(tmp_path)
+    photo = tmp_path / "a.jpg"
+    photo.write_bytes(b"")
+    with pytest.raises(OutputError, match="also an input"):
+        check_output_file(tmp_path / "." / "a.jpg", inputs=[Path("elsewhere"), photo])
+    with pytest.raises(OutputError, match="not a folder; choose another --sheet"):
+        check_output_file(photo / "a.jpg", option="--sheet")
+    assert os.listdir(tmp_path) == ["a.jpg"]
+
+
+def test_what_a_killed_process_left_beside_a_new_folder_is_swept_up(tmp_path):
+    """It lay beside the folder, which was not there yet; the next export writes into the folder."""
+    gone = f".export.{_host()}-{2**22 + 7}-0123456789ab.part"  # no process has such a number
+    (tmp_path / gone).mkdir()
+    (tmp_path / gone / "half").write_bytes(b"x")
+    (tmp_path / "out").mkdir()
+    with staged_folder(tmp_path / "out") as staging:
+        (staging / "a").write_bytes(b"whole")
+    assert [path.name for path in tmp_path.iterdir()] == ["out"]

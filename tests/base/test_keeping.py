@@ -1,5 +1,7 @@
 """Steps that are kept: once made, found again; damaged or of other settings, made anew."""
 
+import io
+from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
 
@@ -44,35 +46,40 @@ def test_a_step_is_made_once(tmp_path: Path):
     assert not keep.folder.exists()
 
 
-@pytest.mark.parametrize("damage", [b"", b"no archive", None])
-def test_a_damaged_step_is_made_again(tmp_path: Path, damage: bytes | None):
+def packed_otherwise(offset: int, value: int) -> Callable[[bytes], bytes]:
+    """Damage to a number of the archive's directory."""
+
+    def damage(whole: bytes) -> bytes:
+        content = bytearray(whole)
+        content[content.index(b"PK\x01\x02") + offset] |= value
+        return bytes(content)
+
+    return damage
+
+
+def an_array(_: bytes) -> bytes:
+    np.save(stream := io.BytesIO(), np.ones(3))
+    return stream.getvalue()
+
+
+DAMAGES = {
+    "empty": lambda _: b"",
+    "no archive": lambda _: b"no archive",
+    "cut": lambda whole: whole[: len(whole) // 2],
+    "encrypted": packed_otherwise(8, 1),
+    "unknown packing": packed_otherwise(10, 99),
+    "array": an_array,
+}
+
+
+@pytest.mark.parametrize("damage", DAMAGES)
+def test_a_damaged_step_is_made_again(tmp_path: Path, damage: str):
     keep = Keep.of(tmp_path, {})
     keep("step", lambda: {"values": np.arange(1000)})
     (path,) = tmp_path.iterdir()
-    whole = path.read_bytes()
-    path.write_bytes(whole[: len(whole) // 2] if damage is None else damage)
+    path.write_bytes(DAMAGES[damage](path.read_bytes()))
     assert np.array_equal(keep("step", lambda: {"values": np.ones(2)})["values"], np.ones(2))
     assert len(list(tmp_path.iterdir())) == 1
-
-
-@pytest.mark.parametrize(("offset", "value"), [(8, 1), (10, 99)], ids=["encrypted", "unknown packing"])
-def test_an_archive_of_another_kind_is_made_again(tmp_path: Path, offset: int, value: int):
-    keep = Keep.of(tmp_path, {})
-    keep("step", lambda: {"values": np.arange(3)})
-    (path,) = tmp_path.iterdir()
-    content = bytearray(path.read_bytes())
-    content[content.index(b"PK\x01\x02") + offset] |= value
-    path.write_bytes(content)
-    assert np.array_equal(keep("step", lambda: {"values": np.ones(2)})["values"], np.ones(2))
-
-
-def test_an_array_in_the_place_of_an_archive_is_made_again(tmp_path: Path):
-    keep = Keep.of(tmp_path, {})
-    keep("step", lambda: {"values": np.arange(3)})
-    (path,) = tmp_path.iterdir()
-    with path.open("wb") as stream:
-        np.save(stream, np.ones(3))
-    assert np.array_equal(keep("step", lambda: {"values": np.ones(2)})["values"], np.ones(2))
 
 
 def test_other_files_of_the_folder_stay(tmp_path: Path):

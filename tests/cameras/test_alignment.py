@@ -4,11 +4,7 @@ import numpy as np
 import pytest
 from scipy.optimize import minimize
 
-from langflash_core.cameras.alignment import (
-    _PRIOR_SIGMAS,
-    NO_CORRECTION,
-    fit_correction,
-)
+from langflash_core.cameras.alignment import _PRIOR_SIGMAS, NO_CORRECTION, fit_correction
 from langflash_core.rig.settings import STRAIGHTENING
 
 

@@ -88,10 +88,7 @@ def test_planes_are_those_of_least_squares(radius):
 
 def test_float32_is_close_to_float64_and_odd_sizes_work():
     logs = _rippled(_wall(), 0.01)
-    exact, fast = (
-        flatten_ripples(logs, _errors(0.08)),
-        flatten_ripples(logs.float(), _errors(0.08).float()),
-    )
+    exact, fast = (flatten_ripples(logs, _errors(0.08)), flatten_ripples(logs.float(), _errors(0.08).float()))
     assert (fast.double() - exact).abs().max() < 1e-5  # sums are float64; depths come with 7 digits
     for size in ((7, 5), (1, 1), (2, 33)):
         odd = torch.rand(3, *size)

@@ -17,10 +17,7 @@ from torch import Tensor
 from torch.nn import functional as F
 
 from langflash_core.base.running import Run
-from langflash_core.depth.registration import (
-    register_depths,
-    smooth,
-)
+from langflash_core.depth.registration import register_depths, smooth
 from langflash_core.depth.surfaces import flatten, one_surface, sharpen
 from langflash_core.rig.rig import Rig
 from langflash_core.rig.settings import REGISTRATION
@@ -161,14 +158,6 @@ def test_true_depth_stays(places):
     changed = (seen.registered(seen.logs) - seen.logs).abs()
     for view, change in enumerate(changed):
         assert change.mean() < FLOW_ERROR / moves(seen, view) / math.sqrt(REGISTRATION.alike)
-
-
-def test_twice_is_the_same_to_the_last_bit_and_what_is_given_stays(pair):
-    bent = pair.logs + bend()
-    kept, photos = bent.clone(), [photo.copy() for photo in pair.photos]
-    assert torch.equal(pair.registered(bent), pair.registered(bent))
-    assert torch.equal(bent, kept)
-    assert all(np.array_equal(*both) for both in zip(photos, pair.photos, strict=True))
 
 
 @pytest.mark.parametrize("ratio", [4, 2, 1])

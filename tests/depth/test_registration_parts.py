@@ -8,12 +8,7 @@ import torch
 from scipy.optimize import least_squares
 from torch import Tensor
 
-from langflash_core.depth.registration import (
-    _Known,
-    _Matches,
-    _triangulate_matches,
-    smooth,
-)
+from langflash_core.depth.registration import _Known, _Matches, _triangulate_matches, smooth
 from langflash_core.rig.settings import REGISTRATION
 from tests.depth.test_registration import poses
 

@@ -14,19 +14,22 @@ def angle(a, b) -> float:
     return float(np.degrees(np.arccos(np.clip(a @ b, -1, 1))))
 
 
+def unit(vectors: np.ndarray) -> np.ndarray:
+    return vectors / np.linalg.norm(vectors, axis=-1, keepdims=True)
+
+
 def sights(up: np.ndarray, *, noise: float = 0.2, clutter: int = 0, seed: int = 0) -> Sights:
     """Sixty edges along each direction of a room, off by `noise` degrees; edges along nothing."""
     rng = np.random.default_rng(seed)
-    first = np.cross(up, [0.3, 0.1, 1.0])
-    axes = np.stack((first / np.linalg.norm(first), up, np.cross(first / np.linalg.norm(first), up)))
+    first = unit(np.cross(up, [0.3, 0.1, 1.0]))
+    axes = np.stack((first, up, np.cross(first, up)))
     edges = []
     for axis in axes:
         eyes = rng.normal(size=(60, 3))
         planes = np.cross(axis, eyes)
         planes += np.radians(noise) * rng.normal(size=planes.shape)
-        edges.append(planes / np.linalg.norm(planes, axis=1, keepdims=True))
-    stray = rng.normal(size=(clutter, 3))
-    edges.append(stray / np.linalg.norm(stray, axis=1, keepdims=True))
+        edges.append(unit(planes))
+    edges.append(unit(rng.normal(size=(clutter, 3))))
     every = np.concatenate(edges)
     return Sights(every, np.full(len(every), 0.1), NONE, np.eye(3)[None])
 
@@ -56,11 +59,9 @@ def test_a_turned_world_has_turned_directions():
 def test_surfaces_alone_tell_up():
     up = leaning(20, -3)
     rng = np.random.default_rng(3)
-    side = np.cross(up, [0.0, 0.2, 1.0])
-    side /= np.linalg.norm(side)
+    side = unit(np.cross(up, [0.0, 0.2, 1.0]))
     normals = np.repeat(np.stack((up, side, np.cross(up, side))), 200, 0) + 0.1 * rng.normal(size=(600, 3))
-    normals /= np.linalg.norm(normals, axis=1, keepdims=True)
-    found = found_directions(Sights(NONE, np.zeros(0), normals, np.eye(3)[None]))
+    found = found_directions(Sights(NONE, np.zeros(0), unit(normals), np.eye(3)[None]))
     assert angle(found.up, up) < 1.5 and found.edges == 0  # normals off by 6 degrees, 400 of them: .3
 
 
@@ -78,17 +79,13 @@ def test_many_edges_outvote_a_floor_whose_depth_leans_and_a_camera_that_looks_do
     """Most edges are along one wall, as of a kitchen front; few are upright, and the floor's surface leans by
     20 degrees about that wall, towards the camera's own up. Rooms turned about it explain most edges, too."""
     up = leaning(-31, 1)
-    wall = np.cross(up, [0.0, 0.0, 1.0])
-    wall /= np.linalg.norm(wall)
+    wall = unit(np.cross(up, [0.0, 0.0, 1.0]))
     rng = np.random.default_rng(5)
     edges = []
     for axis, count in ((wall, 60), (up, 8), (np.cross(wall, up), 8)):
-        planes = np.cross(axis, rng.normal(size=(count, 3)))
-        edges.append(planes / np.linalg.norm(planes, axis=1, keepdims=True))
-    stray = rng.normal(size=(30, 3))
-    every = np.concatenate((*edges, stray / np.linalg.norm(stray, axis=1, keepdims=True)))
-    every += np.radians(0.2) * rng.normal(size=every.shape)
-    every /= np.linalg.norm(every, axis=1, keepdims=True)
+        edges.append(unit(np.cross(axis, rng.normal(size=(count, 3)))))
+    every = np.concatenate((*edges, unit(rng.normal(size=(30, 3)))))
+    every = unit(every + np.radians(0.2) * rng.normal(size=every.shape))
     seen = Sights(every, np.full(len(every), 0.1), NONE, np.eye(3)[None], floor=leaning(-11, 1))
     # About the wall, 16 edges off by .2 degrees tell .2 / sqrt(8) = .07; stray ones pull, as above.
     assert angle(found_directions(seen).up, up) < 0.25
@@ -103,8 +100,7 @@ def test_up_that_is_told_stays_and_the_walls_are_found_around_it():
     up = leaning(10, 1)
     found = found_directions(sights(up), up)
     assert angle(found.up, up) < 1e-5 and found.error == 0
-    wall = np.cross(up, [0.3, 0.1, 1.0])
-    wall /= np.linalg.norm(wall)
+    wall = unit(np.cross(up, [0.3, 0.1, 1.0]))
     assert max(abs(found.axes[:, :2].T @ wall)) > np.cos(np.radians(0.5))
 
 

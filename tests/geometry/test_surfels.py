@@ -176,41 +176,6 @@ def test_spans_are_those_of_a_loop(size):
             assert span[view, row, column].numpy() == pytest.approx(expected, abs=EXACT)
 
 
-@pytest.mark.parametrize("tilt", [0.0, 0.5, -1.0])
-def test_spans_lie_in_their_plane(tilt):
-    pos, footprint = _surface(_plane(tilt))
-    normal = torch.tensor([-tilt, 0.0, 1.0], dtype=torch.float64)
-    for span in spans(pos, footprint):
-        assert (span @ normal).abs().max() < EXACT
-        assert (
-            span.norm(dim=-1) >= 0.9 * footprint * 40 / 44
-        ).all()  # a pixel's side, the nearer neighbour's
-    if tilt == 0:
-        span_u, span_v = spans(pos, footprint)
-        assert (span_u - span_u.new_tensor([2 / 40, 0, 0])).abs().max() < EXACT
-        assert (span_v - span_v.new_tensor([0, 2 / 44, 0])).abs().max() < EXACT
-
-
-def test_at_a_jump_both_sides_keep_to_themselves():
-    depths = _plane(0.0)
-    depths[:, 16:] = 20.0
-    pos, footprint = _surface(depths)
-    span_u, span_v = spans(pos, footprint)
-    assert span_u[..., 2].abs().max() < EXACT and span_v[..., 2].abs().max() < EXACT
-    assert (span_u[..., 0] - footprint).abs().max() < EXACT
-
-
-def test_what_stands_alone_is_not_stretched_over_the_jump():
-    """A column one pixel wide before a wall has no nearer side: SURFELS.stretch footprints at most."""
-    depths = torch.full((24, 32), 20.0, dtype=torch.float64)
-    depths[:, 16] = 2.0
-    pos, footprint = _surface(depths)
-    span_u, span_v = spans(pos, footprint)
-    assert (span_u.norm(dim=-1) <= SURFELS.stretch * footprint * (1 + EXACT)).all()
-    assert (span_u[:, 16].norm(dim=-1) - SURFELS.stretch * 2 / 40).abs().max() < EXACT
-    assert (span_v[:, 16, 2]).abs().max() < EXACT
-
-
 def test_points_that_coincide_have_no_span():
     same = torch.ones(3, 4, 3)
     for span in spans(same, torch.ones(3, 4)):

@@ -11,7 +11,7 @@ from PIL import Image
 from langflash_core.errors import ImageError, InputError
 from langflash_core.images.leaving_out import views_without
 from langflash_core.images.pictures import fitting_size
-from langflash_core.images.views import load_views, source_picture, source_size
+from langflash_core.images.views import load_views
 from langflash_core.types import Views
 from tests.images.pictures import exif, room_picture, saved
 
@@ -184,11 +184,3 @@ def test_counts_and_mixed_sizes_are_refused(tmp_path):
         load_views([path, tmp_path / "c.png"])
     with pytest.raises(ValueError, match="multiple"):
         load_views([path], area=10, multiple=14)
-
-
-def test_sizes_of_sources_are_known_without_their_pixels(tmp_path):
-    """Also of views that hold no sources, whose images are the largest there is."""
-    views = load_views([saved(room_picture(640, 480), tmp_path / "a.png")])
-    for given in (views, replace(views, sources=())):
-        assert source_size(given, 0) == tuple(source_picture(given, 0).shape[1:])
-    assert source_size(views, 0)[0] > views.size[1]

@@ -13,8 +13,8 @@ import torch
 from safetensors import safe_open
 
 from langflash_core.network.checkpoints import store
-from langflash_core.types import Prediction, Views
-from tests.network.sizes import TINY
+from langflash_core.types import Prediction
+from tests.network.sizes import TINY, noise_views
 
 STEP, END = 4, 64  # bytes: a float32, and what torch itself aligns to
 
@@ -54,12 +54,8 @@ def displaced(displacement: int):
 def digest(prediction: Prediction) -> str:
     """Of everything the network said."""
     total = hashlib.sha256()
-    for value in (
-        prediction.gaussians.means,
-        prediction.gaussians.opacities,
-        prediction.weights,
-        prediction.dictionary,
-    ):
+    g = prediction.gaussians
+    for value in (g.means, g.opacities, prediction.weights, prediction.dictionary):
         total.update(value.contiguous().numpy().tobytes())
     return total.hexdigest()
 
@@ -67,9 +63,7 @@ def digest(prediction: Prediction) -> str:
 def main(home: str) -> None:
     """Print a digest per displacement."""
     os.environ["LANGFLASH_HOME"] = home
-    images = torch.rand(2, 3, 64, 64, generator=torch.manual_seed(0))
-    K = torch.tensor([[60.0, 0, 32], [0, 60.0, 32], [0, 0, 1]])
-    views = Views(images, K.expand(2, 3, 3), ("a", "b"))
+    views = noise_views()
     for displacement in range(0, END, STEP):
         store.safe_open = displaced(displacement)
         sys.stdout.write(digest(store.assemble_network(TINY, None, "cpu").predict(views)) + "\n")

@@ -15,7 +15,7 @@ from langflash_core.network.presets import MaskFilter
 from langflash_core.network.semantics.grouping import Groups
 from langflash_core.network.semantics.residual import filter_queries
 from langflash_core.types import Views
-from tests.network.sizes import TINY, large
+from tests.network.sizes import TINY, large, noise_views
 
 UNUSED_UNIT = 2 * (256 * 256 * 9 + 256)
 """The published DPTs carry one residual unit at the coarsest level that nothing reads."""
@@ -25,12 +25,6 @@ UNUSED_UNIT = 2 * (256 * 256 * 9 + 256)
 def tiny() -> PointMapNet:
     torch.manual_seed(0)
     return build_network(TINY).eval()
-
-
-def _views(num_views: int, height: int = 64, width: int = 64) -> Views:
-    images = torch.rand(num_views, 3, height, width, generator=torch.manual_seed(num_views))
-    K = torch.tensor([[0.9 * width, 0, width / 2], [0, 0.9 * width, height / 2], [0, 0, 1]])
-    return Views(images, K.expand(num_views, 3, 3), tuple(f"photo {v}" for v in range(num_views)))
 
 
 def test_parameters_agree_with_the_published_network():
@@ -50,7 +44,7 @@ def test_parameters_agree_with_the_published_network():
 
 @pytest.mark.parametrize("num_views", [1, 2, 3, 8])
 def test_any_number_of_views(tiny, num_views):
-    views = _views(num_views)
+    views = noise_views(num_views)
     prediction = tiny.predict(views)
     gaussians = prediction.gaussians
     assert len(gaussians) == num_views * 64 * 64
@@ -68,7 +62,7 @@ def test_any_number_of_views(tiny, num_views):
 @large
 def test_compiled_parts_give_the_same_numbers(tiny):
     """Through dynamo's capture; its code generation is torch's own and needs a compiler."""
-    views = _views(2)
+    views = noise_views()
     network = build_network(TINY).eval().compiled("eager")
     network.load_state_dict(tiny.state_dict())
     with torch.inference_mode():
@@ -86,28 +80,28 @@ def test_groups_may_come_from_elsewhere(tiny):
         left[:, 0, :, :32], left[:, 1, :, 32:] = 1, 1
         return left
 
-    prediction = tiny.predict(_views(2), groups=halves)
+    prediction = tiny.predict(noise_views(), groups=halves)
     assert seen == [((2, 64, 64), 2)]
     assert prediction.weights[0, :, 0, 0].tolist() == [1, 0] and prediction.dictionary.shape == (2, 512)
 
 
 @pytest.mark.parametrize("size", [(48, 80), (80, 48), (16, 16)])
 def test_any_shape_of_whole_patches(tiny, size):
-    prediction = tiny.predict(_views(2, *size))
+    prediction = tiny.predict(noise_views(2, *size))
     assert prediction.depths.shape == (2, *size)
     assert torch.isfinite(prediction.gaussians.means).all()
 
 
 @pytest.mark.parametrize("value", [0.0, 1.0])
 def test_blank_identical_photos_stay_finite(tiny, value):
-    views = replace(_views(2), images=torch.full((2, 3, 64, 64), value))
+    views = replace(noise_views(), images=torch.full((2, 3, 64, 64), value))
     prediction = tiny.predict(views)
     assert torch.isfinite(prediction.gaussians.means).all() and torch.isfinite(prediction.viewmats).all()
 
 
 def test_one_photo_is_paired_with_itself(tiny):
-    one = tiny.predict(_views(1))
-    views = _views(1)
+    one = tiny.predict(noise_views(1))
+    views = noise_views(1)
     twice = Views(views.images.repeat(2, 1, 1, 1), views.Ks.repeat(2, 1, 1), ("a", "b"))
     both = tiny.predict(twice)
     torch.testing.assert_close(one.gaussians.means, both.gaussians.means[: 64 * 64])
@@ -117,7 +111,7 @@ def test_without_grouping_weights_groups_come_from_the_language_features():
     torch.manual_seed(0)
     network = build_network(TINY).eval()
     network.grouped = False
-    weights = network.predict(_views(2)).weights
+    weights = network.predict(noise_views()).weights
     assert weights.shape[1] >= 1
     torch.testing.assert_close(weights.sum(1), torch.ones(2, 64, 64))
 
@@ -214,8 +208,8 @@ def test_the_released_filter_equals_its_twin():
 
 def test_masks_add_up_over_the_layers(tiny):
     """While training every layer answers; the last one alone is the same answer."""
-    tokens = tiny.encode(_views(2).images[None], _views(2).Ks[None])
-    memories, finest = tiny.semantic_maps(tokens, _views(2).images[None])
+    tokens = tiny.encode(noise_views().images[None], noise_views().Ks[None])
+    memories, finest = tiny.semantic_maps(tokens, noise_views().images[None])
     with torch.no_grad():
         alone = tiny.grouping(memories, finest, 2)
         tiny.grouping.train()
@@ -233,7 +227,7 @@ def test_the_real_size_runs_at_256():
     network = build_network(FULL).eval()
     if has_bfloat16():
         network.use_bfloat16()
-    prediction = network.predict(_views(2, 256, 256))
+    prediction = network.predict(noise_views(2, 256, 256))
     assert len(prediction.gaussians) == 2 * 256 * 256
     assert prediction.gaussians.sh.shape[1:] == (25, 3)
     assert torch.isfinite(prediction.gaussians.means).all()

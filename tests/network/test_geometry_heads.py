@@ -40,12 +40,17 @@ def _sweep_twin(features, log_depths, offsets, viewmats, Ks, view, other, plane,
     return float(total @ features[view, :, row, column])
 
 
-def test_sweep_equals_its_twin():
+def _swept(num_views: int, channels: int, height: int, width: int) -> tuple[torch.Tensor, ...]:
+    """Features, log depths and offsets that a sweep reads, and cameras at one place; float64."""
     torch.manual_seed(0)
-    features = F.normalize(torch.randn(2, 6, 24, 32, dtype=torch.float64), dim=1)
-    log_depths = torch.rand(2, 24, 32, dtype=torch.float64) * 0.5 + 0.5
+    features = F.normalize(torch.randn(num_views, channels, height, width, dtype=torch.float64), dim=1)
+    log_depths = torch.rand(num_views, height, width, dtype=torch.float64) * 0.5 + 0.5
     offsets = torch.linspace(-0.4, 0.4, 5, dtype=torch.float64)
-    viewmats = torch.eye(4, dtype=torch.float64).repeat(2, 1, 1)
+    return features, log_depths, offsets, torch.eye(4, dtype=torch.float64).repeat(num_views, 1, 1)
+
+
+def test_sweep_equals_its_twin():
+    features, log_depths, offsets, viewmats = _swept(2, 6, 24, 32)
     viewmats[1, :3, 3] = torch.tensor([-0.3, 0.05, 0.1])
     compared = [Compared.of(features, (24, 32), groups) for groups in (1, 3)]
     (volume, grouped), _ = sweep_correlation(compared, log_depths, offsets, viewmats, K.expand(2, 3, 3))
@@ -73,11 +78,7 @@ def test_vectors_are_gathered_as_grid_sample_has_them():
 def test_a_sweep_in_float32_stays_close_to_float64():
     """Products of unit vectors of 64 numbers round at 1e-6; a place moves by as much of a pixel, and vectors
     change from one pixel to the next by at most 2."""
-    torch.manual_seed(0)
-    features = F.normalize(torch.randn(2, 64, 24, 32, dtype=torch.float64), dim=1)
-    log_depths = torch.rand(2, 24, 32, dtype=torch.float64) * 0.5 + 0.5
-    offsets = torch.linspace(-0.4, 0.4, 5, dtype=torch.float64)
-    viewmats = torch.eye(4, dtype=torch.float64).repeat(2, 1, 1)
+    features, log_depths, offsets, viewmats = _swept(2, 64, 24, 32)
     viewmats[1, 0, 3] = -0.01  # every point stays clear of the border, where it counts or does not
     volumes = []
     for kind in (torch.float64, torch.float32):
@@ -87,27 +88,8 @@ def test_a_sweep_in_float32_stays_close_to_float64():
     assert (volumes[0] - volumes[1]).abs().max() < 1e-4
 
 
-def test_sweep_peaks_at_the_true_depth():
-    """A textured wall at 2 m, prior too near by exp(-0.2): the hypothesis +0.2 matches exactly and wins."""
-    torch.manual_seed(0)
-    offsets = torch.linspace(-0.4, 0.4, 17, dtype=torch.float64)
-    viewmats = torch.eye(4, dtype=torch.float64).repeat(2, 1, 1)
-    viewmats[1, 0, 3] = -0.4  # shifts the wall by 8 pixels
-    texture = F.normalize(torch.randn(1, 8, 24, 40, dtype=torch.float64), dim=1)
-    features = torch.stack((texture[0, :, :, :32], texture[0, :, :, 8:]))
-    log_depths = torch.full((2, 24, 32), np.log(2.0) - 0.2, dtype=torch.float64)
-    compared = [Compared.of(features, (24, 32))]
-    (volume,), _ = sweep_correlation(compared, log_depths, offsets, viewmats, K.expand(2, 3, 3))
-    best = offsets[volume[0, 0, :, :, 8:].argmax(0)]  # the first 8 columns leave the other view
-    assert (best - 0.2).abs().max() < 1e-9
-
-
 def test_a_view_is_compared_with_its_neighbours_alone():
-    torch.manual_seed(0)
-    features = F.normalize(torch.randn(3, 6, 12, 16, dtype=torch.float64), dim=1)
-    log_depths = torch.rand(3, 12, 16, dtype=torch.float64) * 0.5 + 0.5
-    offsets = torch.linspace(-0.4, 0.4, 5, dtype=torch.float64)
-    viewmats = torch.eye(4, dtype=torch.float64).repeat(3, 1, 1)
+    features, log_depths, offsets, viewmats = _swept(3, 6, 12, 16)
     viewmats[1, 0, 3], viewmats[2, 1, 3] = -0.3, 0.2
     Ks = K.expand(3, 3, 3)
 

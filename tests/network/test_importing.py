@@ -19,9 +19,8 @@ from langflash_core.network import LangFlashNet, PointMapNet, build_network, sav
 from langflash_core.network.checkpoints.importing import convert, read_checkpoint
 from langflash_core.network.checkpoints.parts import installed_parts, part_folder, read_part, read_tensors
 from langflash_core.network.checkpoints.store import assemble_network, install, verify_part
-from langflash_core.types import Views
 from tests.network import published
-from tests.network.sizes import TINY
+from tests.network.sizes import TINY, noise_views
 
 
 @pytest.fixture(autouse=True)
@@ -33,12 +32,6 @@ def home(tmp_path, monkeypatch) -> Path:
 def _saved(state: dict, path: Path) -> Path:
     torch.save({"state_dict": state, "epoch": 3, "global_step": 18751}, path)
     return path
-
-
-def _views() -> Views:
-    images = torch.rand(2, 3, 64, 64, generator=torch.manual_seed(0))
-    K = torch.tensor([[60.0, 0, 32], [0, 60.0, 32], [0, 0, 1]])
-    return Views(images, K.expand(2, 3, 3), ("a", "b"))
 
 
 def _installed_network(tmp_path: Path, *, grouping: bool = True) -> PointMapNet:
@@ -63,11 +56,12 @@ def test_imported_saved_and_loaded_is_the_same_network(tmp_path, home):
     for path in part_folder(TINY).iterdir():
         path.unlink()
     again = assemble_network(TINY, tmp_path / "whole.safetensors", "cpu")
+    assert not torch.equal(network.encoder.patch.weight, build_network(TINY).encoder.patch.weight)
     assert not network.aggregated and not again.aggregated  # none of these files holds an aggregation
     for key, value in network.state_dict().items():
         if not key.startswith("aggregation."):  # drawn, in both, and never asked
             assert torch.equal(value, again.state_dict()[key]), key
-    first, second = network.predict(_views()), again.predict(_views())
+    first, second = network.predict(noise_views()), again.predict(noise_views())
     assert torch.equal(first.gaussians.means, second.gaussians.means)
     assert torch.equal(first.weights, second.weights)
     assert torch.equal(first.dictionary, second.dictionary)
@@ -88,7 +82,7 @@ def test_every_number_of_the_checkpoint_arrives(tmp_path):
 def test_without_grouping_and_aggregation_the_scene_is_whole(tmp_path):
     network = _installed_network(tmp_path, grouping=False)
     assert not network.grouped and not network.aggregated
-    prediction = network.predict(_views())
+    prediction = network.predict(noise_views())
     assert prediction.weights.shape[1] >= 1
     torch.testing.assert_close(
         prediction.dictionary.norm(dim=1), torch.ones(len(prediction.dictionary)), atol=1e-5, rtol=0
@@ -108,7 +102,7 @@ def test_bfloat16_takes_half_the_memory_and_stays_near(tmp_path):
     kinds = {key: value.dtype for key, value in mixed.state_dict().items()}
     assert kinds["encoder.blocks.0.attn.query.weight"] == torch.bfloat16
     assert kinds["encoder.norm.weight"] == kinds["point_heads.0.out.weight"] == torch.float32
-    a, b = exact.predict(_views()).gaussians, mixed.predict(_views()).gaussians
+    a, b = exact.predict(noise_views()).gaussians, mixed.predict(noise_views()).gaussians
     # bfloat16 keeps 8 bits: 0.4 % a product, some 2 % after all layers of this random network.
     assert (a.opacities - b.opacities).abs().mean() < 0.02
     assert ((a.means - b.means).norm(dim=1) / a.means.norm(dim=1)).median() < 0.05
@@ -248,7 +242,7 @@ def _installed_pair(tmp_path, *, same: bool, grouping_first: bool) -> tuple[str,
 
 
 def _logits(network: PointMapNet) -> torch.Tensor:
-    views = _views()
+    views = noise_views()
     with torch.inference_mode():
         tokens = network.encode(views.images[None], views.Ks[None])
         return network.group(tokens, views.images[None])[-1].mask_logits
@@ -280,7 +274,7 @@ def test_a_grouping_trained_on_another_encoder_keeps_it_and_says_what_it_costs(t
     fed_wrongly = _logits(network)
     # Why it is kept: two per cent of the weights are several per cent of the masks' logits.
     assert (own - fed_wrongly).norm() / own.norm() > 0.02
-    assert network.notes == () and torch.isfinite(network.predict(_views()).weights).all()
+    assert network.notes == () and torch.isfinite(network.predict(noise_views()).weights).all()
 
 
 def test_a_copy_survives_saving_and_bfloat16(tmp_path):
@@ -304,7 +298,7 @@ def test_another_geometry_under_a_sharing_grouping_is_told(tmp_path):
         _saved(published.draw_noposplat(TINY, seed=5), tmp_path / "re10k_3views.ckpt"), TINY
     ).notes
     assert len(notes) == 1 and "trained on another encoder" in notes[0]
-    prediction = assemble_network(TINY, None, "cpu").predict(_views())
+    prediction = assemble_network(TINY, None, "cpu").predict(noise_views())
     assert any("trained on another encoder" in warning for warning in prediction.warnings)
 
 
@@ -353,7 +347,9 @@ def test_parts_of_older_versions_are_read_and_say_what_they_do_not_know(tmp_path
 
 
 def _of_size(network: LangFlashNet) -> list[str]:
-    return [warning for warning in network.predict(_views()).warnings if "were trained on photos" in warning]
+    return [
+        warning for warning in network.predict(noise_views()).warnings if "were trained on photos" in warning
+    ]
 
 
 def test_weights_trained_at_512_say_so_when_they_see_less(tmp_path):
@@ -395,10 +391,3 @@ def test_damaged_parts_are_refused(kind, tmp_path):
     with pytest.raises(WeightsError) as caught:
         assemble_network(TINY, path, "cpu")
     assert "\n" not in str(caught.value)
-
-
-def test_a_fresh_network_of_the_same_shape_is_not_filled(tmp_path):
-    """The test of all tests here: drawn weights differ from the imported ones."""
-    network = _installed_network(tmp_path)
-    fresh = build_network(TINY)
-    assert not torch.equal(network.encoder.patch.weight, fresh.encoder.patch.weight)

@@ -97,10 +97,7 @@ def test_unknown_depths_say_nothing(bad):
     assert torch.equal(found, torch.zeros(3, PART_NAMING.place))
     assert places(
         weights[:, :0], torch.ones(2, SIDE, SIDE), torch.eye(4).repeat(2, 1, 1), KS.repeat(2, 1, 1)
-    ).shape == (
-        0,
-        PART_NAMING.place,
-    )
+    ).shape == (0, PART_NAMING.place)
 
 
 def test_looks_are_means_of_the_parts_own_patches():

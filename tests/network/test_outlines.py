@@ -10,7 +10,7 @@ from langflash_core.network.semantics.mobile_sam.model import MobileSam
 from langflash_core.network.semantics.outlines import FILES, Outlines, apply_outlines, mobile_sam_checkpoint
 from langflash_core.network.semantics.settings import OUTLINING
 from langflash_core.pipeline import reconstruct
-from tests.network.published import mobile_sam_name
+from tests.network.published import mobile_sam_file
 
 SIDE = 128
 
@@ -72,13 +72,8 @@ def test_groups_that_a_photo_hardly_shows_are_not_asked_for(sam):
 def test_weights_are_looked_for_by_name(sam, home):
     with pytest.raises(WeightsError, match=r"not at hand; put the authors' mobile_sam.pt"):
         Outlines.load_installed("cpu")
-    encoder = "image_encoder."
-    state = {
-        encoder + mobile_sam_name(name.removeprefix(encoder)) if name.startswith(encoder) else name: value
-        for name, value in sam.state_dict().items()
-    }
     weights_folder().mkdir(parents=True)
-    save_file(state, weights_folder() / FILES[0])
+    save_file(mobile_sam_file(sam), weights_folder() / FILES[0])
     assert mobile_sam_checkpoint() == weights_folder() / FILES[0]
     assert Outlines.load_installed("cpu", SIDE).model.side == SIDE
 

@@ -12,7 +12,7 @@ from torch.nn import functional as F
 
 from langflash_core.geometry.cameras import intrinsics_from_fov, invert_rigid, rays, transform
 from langflash_core.types import Camera, Gaussians, Prediction, Views
-from tests.scene.plane import CHANNELS, NUM_ATOMS, poses
+from tests.scene.plane import NUM_ATOMS, poses, told
 
 GRID = (30, 40)
 WALL, SCREEN = 3.0, 2.0  # z in the world
@@ -51,20 +51,10 @@ def photographed(
         photos.append((photo * 255).round() / 255)
     surfaces = [_surface(camera, screen) for camera in whole]
     depths = torch.stack([depth for depth, _ in surfaces])
-    generator = torch.Generator().manual_seed(0)
     x, y = (torch.stack([points[..., k] for _, points in surfaces]) for k in (0, 1))
     logits = torch.stack([(x * (k + 1)).sin() * 4 + (y * (5 - k)).cos() * 3 for k in range(NUM_ATOMS)], 1)
-    prediction = Prediction(
-        gaussians=Gaussians.none(),
-        weights=logits.softmax(1),
-        dictionary=F.normalize(torch.randn(NUM_ATOMS, CHANNELS, generator=generator), dim=-1),
-        space="minilm",
-        viewmats=viewmats,
-        depths=depths,
-        confidences=torch.full(depths.shape, 0.9),
-        warnings=("a note of the network",),
-        timings={"encoder": 0.25},
-    )
+    drawn = torch.Generator().manual_seed(0)
+    prediction = told(Gaussians.none(), logits.softmax(1), viewmats, depths, drawn)
     images = torch.stack([F.interpolate(photo[None], GRID, mode="area")[0] for photo in photos])
     names = tuple(f"{view}.png" for view in range(num_views))
     sources = tuple(png(photo) for photo in photos)

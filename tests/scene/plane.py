@@ -1,10 +1,12 @@
 """A textured wall seen by several cameras: a prediction whose truth is known."""
 
 import torch
+from torch.nn.functional import normalize
 
 from langflash_core.geometry.cameras import intrinsics_from_fov, invert_rigid, transform, unproject
 from langflash_core.geometry.harmonics import colour_to_sh
 from langflash_core.types import Gaussians, Prediction, Views
+from tests.splat.scenes import unturned
 
 NUM_ATOMS, CHANNELS = 6, 32
 
@@ -19,6 +21,27 @@ def poses(num_views: int, step: float = 0.2) -> torch.Tensor:
         centre = torch.tensor([step * view, 0.03 * view, 0.0])
         viewmats[view, :3, 3] = -viewmats[view, :3, :3] @ centre
     return viewmats
+
+
+def told(
+    gaussians: Gaussians,
+    weights: torch.Tensor,
+    viewmats: torch.Tensor,
+    depths: torch.Tensor,
+    generator: torch.Generator,
+) -> Prediction:
+    """What a network would say that has drawn its dictionary."""
+    return Prediction(
+        gaussians=gaussians,
+        weights=weights,
+        dictionary=normalize(torch.randn(NUM_ATOMS, CHANNELS, generator=generator), dim=-1),
+        space="minilm",
+        viewmats=viewmats,
+        depths=depths,
+        confidences=torch.full(depths.shape, 0.9),
+        warnings=("a note of the network",),
+        timings={"encoder": 0.25},
+    )
 
 
 def wall_prediction(
@@ -45,26 +68,9 @@ def wall_prediction(
     logits = torch.stack([(x * (k + 1)).sin() * 4 + (y * (5 - k)).cos() * 3 for k in range(NUM_ATOMS)], -1)
     weights = logits.softmax(-1).view(num_views, height, width, NUM_ATOMS).permute(0, 3, 1, 2)
     footprints = (depths / K[0, 0]).flatten()
-    gaussians = Gaussians(
-        means=means,
-        quats=torch.tensor([1.0, 0, 0, 0]).repeat(len(means), 1),
-        scales=footprints[:, None] * torch.tensor([0.6, 0.6, 0.1]),
-        opacities=torch.full((len(means),), 0.9),
-        sh=colour_to_sh(colours)[:, None],
-    )
-    prediction = Prediction(
-        gaussians=gaussians,
-        weights=weights.contiguous(),
-        dictionary=torch.nn.functional.normalize(
-            torch.randn(NUM_ATOMS, CHANNELS, generator=generator), dim=-1
-        ),
-        space="minilm",
-        viewmats=viewmats,
-        depths=depths,
-        confidences=torch.full(depths.shape, 0.9),
-        warnings=("a note of the network",),
-        timings={"encoder": 0.25},
-    )
+    scales = footprints[:, None] * torch.tensor([0.6, 0.6, 0.1])
+    gaussians = unturned(means, scales, sh=colour_to_sh(colours)[:, None])
+    prediction = told(gaussians, weights.contiguous(), viewmats, depths, generator)
     images = colours.view(num_views, height, width, 3).permute(0, 3, 1, 2).contiguous()
     names = tuple(f"{view}.jpg" for view in range(num_views))
     photos = tuple(bytes([255, 216, view]) for view in range(num_views))

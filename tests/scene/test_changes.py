@@ -1,7 +1,5 @@
 """Gaussians moved and recoloured, against a float64 twin; two scenes as one; a history with an end."""
 
-import subprocess
-import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -102,11 +100,6 @@ def test_turns_against_the_formulas_of_quaternions() -> None:
         rough = parse_change("moved", some_rows(), [*(3.0 * quats[0]).tolist(), 1.0, 0.0, 0.0, 0.0])
         assert isinstance(rough, Moved)
         np.testing.assert_allclose(rough.turn, one, atol=1e-12)
-
-
-def test_who_turns_nothing_waits_for_no_scipy() -> None:
-    code = "import sys, langflash_core.scene.edits; sys.exit('scipy' in sys.modules)"
-    assert subprocess.run([sys.executable, "-c", code]).returncode == 0
 
 
 def test_what_the_camera_moves_along_with_looks_the_same() -> None:

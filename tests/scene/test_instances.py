@@ -6,18 +6,13 @@ import torch
 from langflash_core.scene.instances import disc_radii, instances
 from langflash_core.scene.settings import INSTANCES
 from langflash_core.types import Gaussians
+from tests.splat.scenes import unturned
 
 
 def discs(means: np.ndarray, radius: float | np.ndarray = 0.02) -> Gaussians:
-    count = len(means)
-    wide = np.broadcast_to(radius, count)
-    return Gaussians(
-        torch.from_numpy(means.astype(np.float32)),
-        torch.tensor([1.0, 0, 0, 0]).repeat(count, 1),
-        torch.from_numpy(np.stack((wide, wide, 0.1 * wide), 1).astype(np.float32)),
-        torch.full((count,), 0.9),
-        torch.zeros(count, 1, 3),
-    )
+    wide = np.broadcast_to(radius, len(means))
+    scales = torch.from_numpy(np.stack((wide, wide, 0.1 * wide), 1).astype(np.float32))
+    return unturned(torch.from_numpy(means.astype(np.float32)), scales)
 
 
 def patch(x: float, z: float = 1.0, side: int = 12, step: float = 0.03) -> np.ndarray:

@@ -12,6 +12,7 @@ from langflash_core.geometry.cameras import invert_rigid
 from langflash_core.scene.lookouts import lookouts
 from langflash_core.scene.settings import LOOKOUTS
 from langflash_core.types import Camera, Gaussians
+from tests.splat.scenes import unturned
 
 SIZE = (64, 48)
 STOOD = (0.6, -1.5, -0.8)
@@ -20,16 +21,8 @@ HALF = (2.0, 1.5)  # of the room, along x and z; it is 2.4 high, its floor at 0
 
 def surfels(means: np.ndarray, seen_from: tuple[float, float, float]) -> Gaussians:
     """Grey ones, as large as pixels of a photo from there."""
-    count, points = len(means), torch.from_numpy(means).float()
-    sizes = 0.01 * (points - torch.tensor(seen_from)).norm(dim=1)
-    quats = torch.tensor([1.0, 0, 0, 0]).repeat(count, 1)
-    return Gaussians(
-        points,
-        quats,
-        sizes[:, None].expand(-1, 3).clone(),
-        torch.full((count,), 0.9),
-        torch.zeros(count, 1, 3),
-    )
+    points = torch.from_numpy(means).float()
+    return unturned(points, 0.01 * (points - torch.tensor(seen_from)).norm(dim=1, keepdim=True))
 
 
 @pytest.fixture(scope="module")

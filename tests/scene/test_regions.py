@@ -14,6 +14,7 @@ from langflash_core.scene.instances import things
 from langflash_core.scene.regions import _mutual, regions_of
 from langflash_core.scene.settings import REGIONS
 from langflash_core.types import Gaussians, Record, Scene, Semantics
+from tests.splat.scenes import unturned
 
 HEIGHT, WIDTH, FOV = 60, 80, 60.0
 WALL, LEFT, RIGHT, SIGN = 0, 1, 2, 3  # what each Gaussian is of
@@ -53,21 +54,14 @@ def photographed(shifts: tuple[float, ...] = (0.0, 0.15)) -> tuple[Scene, np.nda
         parts.append(transform(invert_rigid(viewmat), points).reshape(-1, 3))
         whose.append(ids.ravel())
     own = np.concatenate(whose)
-    means, count = torch.cat(parts), len(own)
+    means = torch.cat(parts)
     wide = (means[:, 2] / focal() * 0.85)[:, None]
-    gaussians = Gaussians(
-        means,
-        torch.tensor([1.0, 0, 0, 0]).repeat(count, 1),
-        torch.cat((wide, wide, 0.1 * wide), 1),
-        torch.full((count,), 0.95),
-        colour_to_sh(COLOURS[own])[:, None],
-    )
-    dictionary = torch.tensor(
-        [[1.0, 0, 0], [0, 1, 0], [0, 1, 0.4]]
-    )  # a sign is more like a box than a wall is
+    scales = torch.cat((wide, wide, 0.1 * wide), 1)
+    # A sign is more like a box than a wall is.
+    dictionary = torch.tensor([[1.0, 0, 0], [0, 1, 0], [0, 1, 0.4]])
     return Scene(
-        gaussians,
-        Semantics(ATOMS[own][:, None], torch.ones(count, 1), dictionary, "none"),
+        unturned(means, scales, 0.95, colour_to_sh(COLOURS[own])[:, None]),
+        Semantics(ATOMS[own][:, None], torch.ones(len(own), 1), dictionary, "none"),
         viewmats,
         K.expand(len(shifts), 3, 3).contiguous(),
         (WIDTH, HEIGHT),

@@ -66,6 +66,17 @@ def cloud(
     return scene_of(gaussians.map(lambda v: v.to(dtype)), ids, values.to(dtype), atoms.to(dtype))
 
 
+def unturned(
+    means: torch.Tensor, scales: float | torch.Tensor, opacity: float = 0.9, sh: torch.Tensor | None = None
+) -> Gaussians:
+    """Gaussians along the axes of the world, grey without `sh`. scales: (N, 3), or what becomes it."""
+    count = len(means)
+    quats = torch.tensor([1.0, 0, 0, 0]).repeat(count, 1)
+    scales = torch.as_tensor(scales).expand(count, 3).clone()
+    sh = torch.zeros(count, 1, 3) if sh is None else sh
+    return Gaussians(means, quats, scales, torch.full((count,), opacity), sh)
+
+
 def scene_of(
     gaussians: Gaussians,
     ids: torch.Tensor | None = None,

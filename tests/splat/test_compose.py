@@ -11,6 +11,7 @@ import torch
 from langflash_core.geometry.nearness import FLOOR, Nearness
 from langflash_core.splat import compose, reference
 from langflash_core.types import Camera, Frame, Gaussians, Record, Scene, Semantics
+from tests.splat.scenes import unturned
 
 SIZE = 8
 
@@ -22,10 +23,8 @@ def wall(depth: float, colour: float, atom: int) -> tuple[Gaussians, Semantics]:
     y, x = torch.meshgrid(steps, along, indexing="ij")
     means = torch.stack((x, y, torch.ones_like(x)), -1).reshape(-1, 3) * depth
     count = len(means)
-    scales = torch.full((count, 3), 0.16 * depth)
-    quats = torch.tensor([1.0, 0, 0, 0]).repeat(count, 1)
     sh = torch.full((count, 1, 3), (colour - 0.5) / 0.28209479177387814)
-    gaussians = Gaussians(means, quats, scales, torch.full((count,), 0.95), sh)
+    gaussians = unturned(means, 0.16 * depth, 0.95, sh)
     ids = torch.full((count, 1), atom)
     return gaussians, Semantics(ids, torch.ones(count, 1), torch.eye(4), "minilm")
 

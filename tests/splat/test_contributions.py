@@ -35,7 +35,7 @@ def test_cut_into_rectangles_it_is_the_same(monkeypatch):
     gaussians, seen = cloud(300, size=0.08).gaussians, camera()
     pixels = brush(seen.height, seen.width, 20.0, 20.0, 15.0)
     whole = contributions(gaussians, seen, pixels)
-    monkeypatch.setattr("langflash_core.splat.contributions._MAX_PAIRS", 50)
+    monkeypatch.setattr("langflash_core.splat.reference._MAX_PAIRS", 50)
     torch.testing.assert_close(contributions(gaussians, seen, pixels), whole, rtol=0, atol=EXACT)
 
 

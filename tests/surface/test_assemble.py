@@ -8,7 +8,6 @@ import torch
 from langflash_core.errors import InputError
 from langflash_core.scene.checks import check_scene
 from langflash_core.scene.weights import sparse_weights
-from langflash_core.splat.reference import render
 from langflash_core.surface.assemble import assemble
 from langflash_core.types import Scene
 from tests.scene.plane import wall_prediction
@@ -33,28 +32,6 @@ def test_the_mean_distance_of_view_0_is_one_and_everything_moved_with_it():
     assert torch.allclose(scene.gaussians.scales * unit, prediction.gaussians.scales)
     assert torch.allclose(scene.viewmats[:, :3, 3] * unit, prediction.viewmats[:, :3, 3])
     assert torch.equal(scene.viewmats[:, :3, :3], prediction.viewmats[:, :3, :3])
-
-
-def test_the_unit_of_the_network_does_not_show():
-    """The same prediction in metres and in millimetres is the same scene and the same picture: of a rough
-    wall, since on a plane Gaussians are as deep as each other, and rounding says which is in front."""
-    prediction, views = wall_prediction(width=28, height=28, noise=0.02)
-    big = replace(
-        prediction,
-        gaussians=replace(
-            prediction.gaussians,
-            means=prediction.gaussians.means * 1000,
-            scales=prediction.gaussians.scales * 1000,
-        ),
-        viewmats=torch.cat((prediction.viewmats[:, :, :3], prediction.viewmats[:, :, 3:] * 1000), -1),
-        depths=prediction.depths * 1000,
-    )
-    big.viewmats[:, 3, 3] = 1
-    small_scene, big_scene = assemble(prediction, views), assemble(big, views)
-    assert torch.allclose(small_scene.gaussians.means, big_scene.gaussians.means, atol=1e-5)
-    first, second = (render(s, s.camera(1)).rgb for s in (small_scene, big_scene))
-    # Same numbers up to float32 rounding of the lengths.
-    assert float((first - second).abs().max()) < 1e-3
 
 
 def test_the_record_tells_where_the_scene_came_from():

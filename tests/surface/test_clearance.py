@@ -63,26 +63,6 @@ def test_clearances_are_distances_to_the_nearest_end(seed, size):
     assert either <= 0.1 * found.size
 
 
-@pytest.mark.parametrize("turns", range(4))
-def test_the_nearer_side_ends_and_the_farther_is_endless(turns):
-    """Counted from the middles of pixels: a half beside the end, and one more a column."""
-    logs = torch.zeros(9, 14)
-    logs[:, 6:] = 1.5 * UPSAMPLING.jump
-    expected = torch.full((9, 14), torch.inf)
-    expected[:, :6] = torch.arange(6).flip(0) + 0.5
-    found = clearances(torch.rot90(logs, turns).contiguous())
-    assert torch.equal(found, torch.rot90(expected, turns))
-
-
-def test_three_walls_one_behind_the_other():
-    """The middle one ends over the last and on behind the first, whose end is nearer to its left half."""
-    logs = torch.tensor([0.0, 1.0, 2.0]).repeat_interleave(6).expand(8, 18).contiguous()
-    found = clearances(logs)[4]
-    assert found[:6].tolist() == [5.5, 4.5, 3.5, 2.5, 1.5, 0.5]
-    assert found[6:8].isinf().all() and found[9:12].tolist() == [2.5, 1.5, 0.5]
-    assert found[12:].isinf().all()
-
-
 @pytest.mark.parametrize("size", [(1, 1), (1, 7), (12, 15)])
 @pytest.mark.parametrize("step", [0.0, 0.9 * UPSAMPLING.jump])
 def test_without_a_jump_nothing_ends(size, step):

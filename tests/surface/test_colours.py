@@ -101,17 +101,6 @@ def test_equals_dense_float64_rounds():
     assert np.abs(solved.colours.numpy() - colours).max() < 10 * CLOSE  # eight rounds, each a little ahead
 
 
-def test_things_that_do_not_mix_are_solved_at_once():
-    """One Gaussian a pixel: the mean over its pixels is its colour, after a single round."""
-    places = [(x / 4, y / 4, 1.0) for x in (-2, -1, 0, 1, 2) for y in (-1, 0, 1)]
-    gaussians = splats(places, 0.03, 0.99, dtype=torch.float32)
-    colours = torch.rand(15, 3, generator=torch.Generator().manual_seed(0))
-    solved = solved_colours(
-        gaussians, grey(colours), camera(), picture(gaussians, colours, camera())[0], rounds=1
-    )
-    assert (solved.colours - colours).abs().max() < CLOSE
-
-
 def test_colours_stay_between_black_and_white():
     """A hard edge under wide Gaussians asks for more than white and less than black."""
     gaussians, colours = scene(size=0.1)
@@ -189,20 +178,3 @@ def test_psnr_is_that_of_the_drawn_picture():
         off = (found - photo)[:, torch.from_numpy(np.asarray(light)) >= 0.5]
         assert psnr == pytest.approx(-10 * math.log10(off.square().mean()), abs=0.1)
     assert solved.psnr[1] > solved.psnr[0]
-
-
-def test_no_rounds_is_the_start_and_what_is_given_stays():
-    gaussians, colours = scene()
-    start, photo = grey(colours), torch.rand(3, 40, 48)
-    kept, given = start.clone(), photo.clone()
-    solved = solved_colours(gaussians, start, camera(), photo, rounds=0)
-    assert torch.equal(solved.colours, start) and solved.psnr[0] == solved.psnr[1]
-    moved = solved_colours(gaussians, start, camera(), photo)
-    assert torch.equal(start, kept) and torch.equal(photo, given) and not torch.equal(moved.colours, start)
-
-
-def test_twice_is_the_same_to_the_last_bit():
-    gaussians, colours = scene()
-    photo = torch.rand(3, 40, 48)
-    one, two = (solved_colours(gaussians, colours, camera(), photo) for _ in range(2))
-    assert torch.equal(one.colours, two.colours) and one.psnr == two.psnr

@@ -2,7 +2,6 @@
 
 import itertools
 
-import pytest
 import torch
 
 from langflash_core.geometry.cameras import invert_rigid, transform, unproject
@@ -12,43 +11,6 @@ from langflash_core.surface.settings import CONSISTENCY
 from tests.geometry.twins import seen_at
 
 K = torch.tensor([[30.0, 0, 16], [0, 30.0, 12], [0, 0, 1]])
-
-
-def _two_views(depths_0: float, depths_1: float, confidence_0: float = 0.5, confidence_1: float = 0.5):
-    """Two cameras side by side look at a wall; each has its own idea of how far it is."""
-    viewmats = torch.eye(4).repeat(2, 1, 1)
-    viewmats[1, 0, 3] = -0.2
-    depths = torch.stack((torch.full((24, 32), depths_0), torch.full((24, 32), depths_1)))
-    confidences = torch.stack((torch.full((24, 32), confidence_0), torch.full((24, 32), confidence_1)))
-    return seen_through(Rig(viewmats, K.expand(2, 3, 3), depths, confidences))
-
-
-def test_agreeing_views_keep_everything():
-    assert not _two_views(2.0, 2.0).any()
-    assert not _two_views(2.0, 1.9).any()  # 5 %: within the tolerance
-
-
-@pytest.mark.parametrize("confidences", [(0.6, 0.5), (0.5, 0.5)])
-def test_the_nearer_wall_goes_where_it_is_less_trusted(confidences):
-    blocked = _two_views(2.0, 1.0, *confidences)
-    assert not blocked[0].any()
-    assert blocked[1, :, 8:24].all()  # what view 0 sees of it
-    assert not blocked[1].all()  # what view 0 cannot see stays
-
-
-def test_a_trusted_near_wall_stays():
-    assert not _two_views(2.0, 1.0, 0.4, 0.6).any()
-
-
-def test_a_conflict_never_takes_both():
-    """Whatever the depths and confidences, a point of view 0 and its rival are not both dropped."""
-    torch.manual_seed(0)
-    viewmats = torch.eye(4).repeat(2, 1, 1)
-    depths = torch.rand(2, 24, 32) * 3 + 0.5
-    confidences = torch.randint(0, 3, (2, 24, 32)) / 2
-    blocked = seen_through(Rig(viewmats, K.expand(2, 3, 3), depths, confidences))
-    assert blocked.any()
-    assert not (blocked[0] & blocked[1]).any()  # the same cameras: rivals share a pixel
 
 
 def test_one_view_and_points_behind_are_left_alone():

@@ -117,31 +117,6 @@ def test_slanted_walls_are_closed_too(normal, side):
     assert float(alphas(sight.gaussians(made), window(sight, 2, 44, 44, 16)).min()) >= 0.99
 
 
-def passed(deviation: float, spacing: float = 1.0, cut: float = 1 / 255) -> np.ndarray:
-    """(40, 40): 1 - alpha over a cell of side 4 of a lattice of flat elements, by direct summation."""
-    along = np.arange(-40, 44) * spacing + spacing / 2
-    places = (np.arange(40) + 0.5) / 10
-    off = np.exp(-((places[:, None] - along) ** 2) / (2 * (deviation * spacing) ** 2))
-    left = np.ones((40, 40))
-    for row in off.T:
-        for column in off.T:
-            if row.max() * column.max() > cut:
-                alpha = COVERING.opacity * row[:, None] * column
-                left *= 1 - np.where(alpha < cut, 0, alpha)
-    return left
-
-
-def test_the_numbers_of_the_docstring():
-    """Rounded there to the digits given; places a twentieth of a spacing from the worst let less pass."""
-    flat, fine, below = passed(0.85), passed(0.5), passed(0.72, 4.0)
-    assert flat.max() == pytest.approx(0.0013, abs=1e-4)
-    assert fine.max() == pytest.approx(0.155, abs=3e-3)
-    assert below.max() == pytest.approx(0.0103, abs=2e-4)
-    assert (fine * below).max() == pytest.approx(0.0016, abs=1e-4)
-    for left in (flat, fine * below):
-        assert left.max() - left.min() < 0.5 / 255
-
-
 @pytest.mark.parametrize("normal", SLANTED)
 @pytest.mark.parametrize("ratio", [1, 3])
 def test_fine_elements_lie_on_the_plane_and_face_along_it(normal, ratio):
@@ -224,9 +199,8 @@ def test_colours_and_cells_are_those_of_the_squares():
     sight = Sight.of(grid=(6, 8))
     for side in (1, 2, 4, 16):
         made = sight.coarse(side)
-        for i, (left, top) in enumerate(
-            zip(*[iter_.tolist() for iter_ in corners(sight, side)], strict=True)
-        ):
+        corners = squares(side, sight.size)
+        for i, (left, top) in enumerate(zip(corners.left.tolist(), corners.top.tolist(), strict=True)):
             inside = sight.photo[:, top : top + side, left : left + side]
             if inside.shape[-2:] == (side, side):
                 assert torch.allclose(made.colours[i], inside.mean((1, 2)), atol=FLOAT32)
@@ -238,11 +212,6 @@ def test_colours_and_cells_are_those_of_the_squares():
     drawn = sight.gaussians(sight.coarse(2))
     shown = sh_to_colour(drawn.sh, torch.zeros(len(drawn), 3))
     assert torch.allclose(shown, sight.coarse(2).colours, atol=FLOAT32)
-
-
-def corners(sight: Sight, side: int) -> tuple[Tensor, Tensor]:
-    all_of_them = squares(side, sight.size)
-    return all_of_them.left, all_of_them.top
 
 
 def two_surfaces(near: Tensor) -> tuple[Tensor, Upsampled]:

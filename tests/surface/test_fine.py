@@ -7,8 +7,6 @@ import torch
 from torch import Tensor
 
 from langflash_core.base.detail import DETAILS
-from langflash_core.errors import InputError
-from langflash_core.images.views import source_pictures
 from langflash_core.scene.checks import check_scene
 from langflash_core.scene.exposure import lit_camera
 from langflash_core.splat import render
@@ -48,11 +46,6 @@ def difference(scene: Scene, view: int, photo: Tensor) -> float:
 def shown(scene: Scene, camera: Camera) -> Tensor:
     """(3, h, w)."""
     return render(scene, camera, weight_maps=False).rgb.movedim(-1, 0).clamp(0, 1)
-
-
-def test_sources_are_the_photos(given):
-    for source, photo in zip(source_pictures(given.views), given.photos, strict=True):
-        assert torch.allclose(source, photo, atol=1e-6)  # 8 bits there and back
 
 
 @pytest.mark.parametrize("ratios", [(3,), (3, 1, 2.2)])
@@ -100,6 +93,7 @@ def test_a_scene_and_its_record_are_whole(given, fine):
 def test_light_is_recorded_where_it_is_not_the_identity():
     alone, light = made(photographed(1))
     assert alone.record.light == {} and torch.equal(light.gains, torch.ones(1, 3).double())
+    assert not alone.layered
     scene, light = made(photographed(gains=(1.0, 0.7)))
     assert scene.record.light == light.stored()
     gains = torch.tensor(scene.record.light["gains"])
@@ -141,21 +135,6 @@ def test_a_view_without_a_place_leaves_no_trace():
     check_scene(scene)
 
 
-@pytest.mark.parametrize("bad", [torch.nan, 0.0])
-def test_numbers_that_are_no_depths_do_not_reach_the_scene(given, bad):
-    depths = given.prediction.depths.clone()
-    depths[:, 4:9, 6:20] = bad
-    scene, light = made(replace(given, prediction=replace(given.prediction, depths=depths)))
-    check_scene(scene)
-    assert torch.isfinite(light.gains).all()
-
-
-def test_a_prediction_without_a_usable_depth_is_refused(given):
-    nowhere = replace(given.prediction, depths=given.prediction.depths * torch.nan)
-    with pytest.raises(InputError, match="no depth could be found"):
-        made(replace(given, prediction=nowhere))
-
-
 @pytest.mark.parametrize("smaller", [True, False])
 def test_without_finer_photos_the_network_s_own_do(smaller):
     """Sources smaller than the grid, or none."""
@@ -164,15 +143,6 @@ def test_without_finer_photos_the_network_s_own_do(smaller):
     scene, _ = made(replace(given, views=views))
     check_scene(scene)
     assert scene.record.detail["photo_size"] == [GRID[1], GRID[0]]
-
-
-def test_no_group_survived(given):
-    none = replace(
-        given.prediction, weights=given.prediction.weights[:, :0], dictionary=given.prediction.dictionary[:0]
-    )
-    scene, _ = made(replace(given, prediction=none))
-    check_scene(scene)
-    assert scene.semantics.num_atoms == 0
 
 
 def test_the_number_asked_for_is_kept():
@@ -236,11 +206,6 @@ def test_nothing_of_it_asks_for_gradients():
     weights = given.prediction.weights.clone().requires_grad_()
     scene, _ = made(replace(given, prediction=replace(given.prediction, weights=weights)))
     assert not scene.semantics.weight_values.requires_grad
-
-
-def test_several_photos_make_layers_and_one_makes_none(given, fine):
-    assert fine[0].layered
-    assert not made(photographed(1))[0].layered
 
 
 def test_colours_of_layers_are_the_same_with_several_threads(given):

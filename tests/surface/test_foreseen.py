@@ -8,13 +8,7 @@ import pytest
 import torch
 from torch import Tensor
 
-from langflash_core.geometry.cameras import (
-    intrinsics_from_fov,
-    invert_rigid,
-    rays,
-    transform,
-    world_points,
-)
+from langflash_core.geometry.cameras import intrinsics_from_fov, invert_rigid, rays, transform, world_points
 from langflash_core.geometry.rotations import matrix
 from langflash_core.rig.rig import Rig
 from langflash_core.scene.settings import DOUBTS

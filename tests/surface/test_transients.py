@@ -7,13 +7,7 @@ import pytest
 import torch
 from torch import Tensor
 
-from langflash_core.geometry.cameras import (
-    intrinsics_from_fov,
-    invert_rigid,
-    rays,
-    transform,
-    unproject,
-)
+from langflash_core.geometry.cameras import intrinsics_from_fov, invert_rigid, rays, transform, unproject
 from langflash_core.rig.rig import Rig
 from langflash_core.surface.transients import _CELL, _Look, transient_masks
 from tests.geometry.twins import seen_at

@@ -6,7 +6,6 @@ import numpy as np
 import pytest
 import torch
 from torch import Tensor
-from torch.nn import functional as F
 
 from langflash_core.surface.upsampling import upsample_depths
 
@@ -54,45 +53,6 @@ def test_at_an_edge_every_pixel_has_the_depth_of_the_side_whose_colour_it_has(ra
     assert torch.equal(depth.cells % 12 < edge, pixels < moved)
 
 
-@pytest.mark.parametrize("wide", [1, 2, 3])
-@pytest.mark.parametrize("upright", [True, False])
-def test_a_thin_thing_is_not_drawn_out(wide, upright):
-    """A pole of one cell has a jump on both sides and no slope of its own."""
-    log_depths = torch.full((9, 12), 0.7)
-    log_depths[:, 5 : 5 + wide] = 0.0
-    image = torch.where(log_depths > 0, 0.8, 0.1).expand(3, 9, 12)
-    photo = F.interpolate(image[None], scale_factor=3.0, mode="nearest")[0]
-    if not upright:
-        log_depths, image, photo = log_depths.T, image.mT, photo.mT
-    depth = upsample_depths(log_depths.contiguous(), image, photo)
-    assert torch.allclose(depth.log_depths, torch.where(photo[0] > 0.5, 0.7, 0.0), atol=FLOAT32)
-
-
-def test_without_colours_the_nearest_cell_decides_and_nothing_lies_between():
-    torch.manual_seed(0)
-    log_depths = torch.randint(0, 3, (9, 12)).float()  # jumps everywhere, of a factor of e
-    grey = torch.full((3, 9, 12), 0.5)
-    depth = upsample_depths(log_depths, grey, torch.full((3, 27, 36), 0.5))
-    nearest = torch.arange(9 * 12).view(9, 12).repeat_interleave(3, 0).repeat_interleave(3, 1)
-    assert torch.equal(depth.cells, nearest)
-    # A cell's own slope may change its inverse depth by a tenth: .106 of its logarithm.
-    assert float((depth.log_depths - log_depths.flatten()[nearest]).abs().max()) < 0.106
-
-
-def test_a_slanted_surface_ends_at_its_edge_with_its_own_slope():
-    grid, size = (8, 16), (24, 48)
-    slope = (0.004, 0.002)
-    columns, pixels = torch.arange(16).expand(*grid), torch.arange(48).expand(*size)
-    logs = torch.where(columns < 7, -inverse_plane(grid, grid, slope).log(), 2.0).float()
-    depth = upsample_depths(
-        logs,
-        two_sides(columns, 7, 0.2, 0.8).expand(3, *grid),
-        two_sides(pixels, 22, 0.2, 0.8).expand(3, *size),
-    )
-    expected = torch.where(pixels < 22, -inverse_plane(size, grid, slope).log(), 2.0)
-    assert float((depth.log_depths - expected).abs().max()) < FLOAT32
-
-
 @pytest.mark.parametrize("grid", [(1, 1), (1, 5), (5, 1), (2, 2)])
 def test_a_cell_a_row_a_column(grid):
     size = (3 * grid[0], 2 * grid[1])
@@ -100,18 +60,6 @@ def test_a_cell_a_row_a_column(grid):
     assert torch.allclose(depth.log_depths, torch.full(size, 0.3), atol=FLOAT32)
     assert torch.equal(depth.slopes, torch.zeros(grid))
     assert int(depth.cells.min()) == 0 and int(depth.cells.max()) == grid[0] * grid[1] - 1
-
-
-def test_cells_are_those_of_the_grid_near_the_pixel():
-    torch.manual_seed(1)
-    grid, size = (7, 10), (17, 24)
-    depth = upsample_depths(torch.randn(grid), torch.rand(3, *grid), torch.rand(3, *size))
-    assert int(depth.cells.min()) >= 0 and int(depth.cells.max()) < 70
-    rows = (torch.arange(17) + 0.5) * 7 / 17 - 0.5
-    columns = (torch.arange(24) + 0.5) * 10 / 24 - 0.5
-    assert float((depth.cells // 10 - rows[:, None]).abs().max()) <= 1.5
-    assert float((depth.cells % 10 - columns).abs().max()) <= 1.5
-    assert torch.isfinite(depth.log_depths).all()
 
 
 def step(inverse: np.ndarray, row: int, column: int, dim: int) -> float:

@@ -87,59 +87,10 @@ def without_tips(cells: Tensor) -> Tensor:
     return grown(~grown(~cells))
 
 
-def test_one_photo_owns_all():
-    assert select_views(*seen([camera()])).all()
-
-
-@pytest.mark.parametrize("views", [2, 3, 5])
+@pytest.mark.parametrize("views", [1, 2, 5])
 def test_of_equal_photos_the_first_keeps_all(views):
     keep = select_views(*seen([camera()] * views))
     assert keep[0].all() and not keep[1:].any()
-
-
-@pytest.mark.parametrize("turn", [0.3, -0.5])
-def test_the_later_one_keeps_what_the_earlier_does_not_see(turn):
-    """And goes on by a cell beyond, so that no seam opens; the border itself may be a cell off."""
-    given = seen([camera(), camera(turn=(turn, 0.0))])
-    keep = select_views(*given)
-    unseen = ~inside(*given, view=1, other=0)
-    assert keep[0].all()
-    assert unseen.any() and not unseen.all()
-    assert keep[1][without_tips(unseen)].all() and not keep[1][~grown(unseen, 2)].any()
-    assert (keep[1] & ~unseen).any()
-
-
-@pytest.mark.parametrize("earlier", [True, False])
-@pytest.mark.parametrize(("nearer", "wins"), [(2.2, True), (1.5, True), (1.3, False)])
-def test_the_finer_one_wins_from_twice_the_area_on(earlier, nearer, wins):
-    """At `nearer` times less distance it has that many pixels a length, their square an area: 1.3^2 < 2. A
-    narrow lens: towards the sides both see the wall more from aside, by cosines above .95."""
-    near, far = camera((0.0, 0.0, 3 - 3 / nearer)), camera()
-    given = seen([near, far] if earlier else [far, near], fov=20)
-    keep = select_views(*given)
-    near_at, far_at = (0, 1) if earlier else (1, 0)
-    common = inside(*given, view=far_at, other=near_at, margin=1)
-    assert keep[near_at].all() == (earlier or wins)
-    assert keep[far_at][~grown(~common, 2)].any() != (earlier or wins)
-    assert keep[far_at][~common].all()  # what the nearer does not see
-
-
-@pytest.mark.parametrize("turns", [(0.0, 0.3), (0.0, 0.3, -0.3), (0.0, 0.1, 0.2, 0.3)])
-def test_the_border_of_a_photo_takes_nothing_over(turns, monkeypatch):
-    """Of more than two: where another photo's picture ends both stay, that no crack opens between them."""
-    given = seen([camera(turn=(turn, 0.0)) for turn in turns])
-    everybody_leads(monkeypatch)
-    monkeypatch.setattr(view_selection, "_close_mask", lambda cells: cells)
-    left, border = ~select_views(*given), view_selection._BORDER if len(turns) > 2 else 0
-
-    def within(view: int, margin: float) -> Tensor:
-        """Cells that lie in another picture, so far from its border."""
-        others = [inside(*given, view, other, margin) for other in range(len(turns)) if other != view]
-        return torch.stack(others).any(0)
-
-    assert left.any()
-    assert not any(bool((left[view] & ~within(view, border - 1e-4)).any()) for view in range(len(turns)))
-    assert any(bool((left[view] & ~within(view, border + 1)).any()) for view in range(len(turns)))
 
 
 @pytest.mark.parametrize("leads", [True, False])
@@ -151,23 +102,6 @@ def test_one_that_does_not_lead_takes_over_up_to_its_border(leads, monkeypatch):
     monkeypatch.setattr(view_selection, "_close_mask", lambda cells: cells)
     border = inside(*given, view=0, other=1) & ~inside(*given, view=0, other=1, margin=view_selection._BORDER)
     assert border.any() and (select_views(*given)[0][border] == leads).all()
-
-
-def test_a_wall_seen_from_aside_is_left_to_the_photo_that_faces_it():
-    given = seen([camera((-6.0, 0.0, 1.0), turn=(1.25, 0.0)), camera()])
-    keep = select_views(*given)
-    common = inside(*given, view=0, other=1, margin=1)
-    assert common.sum() > 30 and not keep[0][~grown(~common, 2)].any() and keep[1].all()
-
-
-def test_what_another_photo_cannot_see_is_kept():
-    """A wall behind a screen: the first photo has the screen before it there, the second sees past it."""
-    screen = torch.full((HEIGHT, WIDTH), 3.0)
-    screen[:, 10:22] = 1.0
-    depths = torch.stack((screen, torch.full((HEIGHT, WIDTH), 3.0)))
-    keep = select_views(depths, torch.eye(4).repeat(2, 1, 1), lens(2))
-    assert keep[0].all() and keep[1][:, 10:22].all()
-    assert not keep[1][:, :9].any() and not keep[1][:, 23:].any()
 
 
 @pytest.mark.parametrize("gap", [-BEFORE - 0.01, -BEFORE + 0.01, BEHIND - 0.01, BEHIND + 0.01])
@@ -372,10 +306,10 @@ def plain_closed(keep: np.ndarray) -> np.ndarray:
     return np.array([[around(most, y, x).any() for x in range(WIDTH)] for y in range(HEIGHT)])
 
 
-@pytest.mark.parametrize("seed", [0, 3])
-def test_it_agrees_with_its_twin_cell_by_cell(seed, monkeypatch):
+@pytest.mark.parametrize(("seed", "count"), [(0, 3), (3, 3), (0, 2)])
+def test_it_agrees_with_its_twin_cell_by_cell(seed, count, monkeypatch):
     """In float64, where none of these cells lies as near to a limit as rounding goes."""
-    depths, viewmats, Ks = seen(drawn_views(seed, 3), [WALL, ((0.9, 0.1, 0.42), 1.9)])
+    depths, viewmats, Ks = seen(drawn_views(seed, count), [WALL, ((0.9, 0.1, 0.42), 1.9)])
     generator = torch.Generator().manual_seed(seed)
     depths = depths.double() * torch.exp(0.03 * torch.randn(depths.shape, generator=generator).double())
     given = (depths, viewmats.double(), Ks.double())

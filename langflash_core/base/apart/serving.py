@@ -23,12 +23,7 @@ from typing import Any
 
 HEADER = struct.Struct("<Q")
 OUT_OF_MEMORY = 76  # the code of a process that ended for want of memory
-READERS = {
-    "photo": "photos",
-    "film": "films",
-    "film pictures": "films",
-    "stage": "stages",
-}
+READERS = {"photo": "photos", "film": "films", "film pictures": "films", "stage": "stages"}
 """Which module of this folder answers: its `answers` takes the reader's name, the request and the bytes."""
 
 _IDLE = 20.0  # seconds that a process waits for the next request

@@ -9,7 +9,7 @@ from torch import Tensor, nn
 from torch.nn import functional as F
 
 from langflash_core.network.encoders.vit import ClassTokenEncoder, centre_images
-from langflash_core.network.layers.dpt import double
+from langflash_core.network.layers.dpt import Fusion, resizes
 from langflash_core.network.presets import PointMaps
 
 
@@ -25,24 +25,6 @@ class NormedUnit(nn.Module):
         return x + self.norm2(self.conv2(F.relu(self.norm1(self.conv1(F.relu(x))))))
 
 
-class NormedFusion(nn.Module):
-    """`dpt.Fusion` with batch norms."""
-
-    def __init__(self, feature: int, *, coarsest: bool = False):
-        super().__init__()
-        self.lateral = None if coarsest else NormedUnit(feature)
-        self.mix = NormedUnit(feature)
-        self.out = nn.Conv2d(feature, feature, 1)
-
-    def forward(
-        self, coarse: Float[Tensor, "n C h w"], lateral: Float[Tensor, "n C _ _"] | None = None
-    ) -> Float[Tensor, "n C H W"]:
-        if self.lateral is not None and lateral is not None:
-            # An odd grid makes the coarsest path a row too large; LSeg itself takes only even ones.
-            coarse = coarse[..., : lateral.shape[-2], : lateral.shape[-1]] + self.lateral(lateral)
-        return double(self.out(self.mix(coarse)), align_corners=True)
-
-
 class LSeg(nn.Module):
     """Pictures -> L(x). Frozen: always in evaluation mode, because of its batch norms."""
 
@@ -52,16 +34,11 @@ class LSeg(nn.Module):
         self.vit = ClassTokenEncoder(sizes)
         self.readout = nn.ModuleList(nn.Linear(2 * sizes.dim, sizes.dim) for _ in dims)
         self.project = nn.ModuleList(nn.Conv2d(sizes.dim, n, 1) for n in dims)
-        self.resize = nn.ModuleList(
-            (
-                nn.ConvTranspose2d(dims[0], dims[0], 4, stride=4),
-                nn.ConvTranspose2d(dims[1], dims[1], 2, stride=2),
-                nn.Identity(),
-                nn.Conv2d(dims[3], dims[3], 3, stride=2, padding=1),
-            )
-        )
+        self.resize = resizes(dims)
         self.level = nn.ModuleList(nn.Conv2d(n, sizes.dpt_feature, 3, padding=1, bias=False) for n in dims)
-        self.fuse = nn.ModuleList(NormedFusion(sizes.dpt_feature, coarsest=i == 3) for i in range(4))
+        self.fuse = nn.ModuleList(
+            Fusion(sizes.dpt_feature, coarsest=i == 3, align_corners=True, unit=NormedUnit) for i in range(4)
+        )
         self.out = nn.Conv2d(sizes.dpt_feature, preset.language_dim, 1)
         self.requires_grad_(False).eval()
 

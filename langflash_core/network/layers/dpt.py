@@ -34,19 +34,27 @@ class ResidualUnit(nn.Module):
 
 
 class Fusion(nn.Module):
-    """Add the finer level, mix, double the size."""
+    """Add the finer level, mix, double the size. unit: what mixes."""
 
-    def __init__(self, feature: int, *, coarsest: bool = False, align_corners: bool = False):
+    def __init__(
+        self,
+        feature: int,
+        *,
+        coarsest: bool = False,
+        align_corners: bool = False,
+        unit: type[nn.Module] = ResidualUnit,
+    ):
         super().__init__()
         self.align_corners = align_corners
-        self.lateral = None if coarsest else ResidualUnit(feature)
-        self.mix = ResidualUnit(feature)
+        self.lateral = None if coarsest else unit(feature)
+        self.mix = unit(feature)
         self.out = nn.Conv2d(feature, feature, 1)
 
     def forward(
         self, coarse: Float[Tensor, "n C h w"], lateral: Float[Tensor, "n C _ _"] | None = None
     ) -> Float[Tensor, "n C H W"]:
         if self.lateral is not None and lateral is not None:
+            # An odd grid makes the coarsest path a row too large.
             coarse = coarse[..., : lateral.shape[-2], : lateral.shape[-1]] + self.lateral(lateral)
         # The 1x1 convolution commutes with the bilinear resize and is four times cheaper before it.
         return double(self.out(self.mix(coarse)), align_corners=self.align_corners)
@@ -55,6 +63,19 @@ class Fusion(nn.Module):
 def double(maps: Float[Tensor, "n C h w"], *, align_corners: bool) -> Float[Tensor, "n C H W"]:
     """Maps (n, C, h, w) -> (n, C, 2h, 2w), bilinear."""
     return F.interpolate(maps, scale_factor=2.0, mode="bilinear", align_corners=align_corners)
+
+
+def resizes(dims: tuple[int, int, int, int]) -> nn.ModuleList:
+    """What brings maps of the grid's size, of so many channels each, to 4, 2, 1 and half times it."""
+    a, b, _, d = dims
+    return nn.ModuleList(
+        (
+            nn.ConvTranspose2d(a, a, 4, stride=4),
+            nn.ConvTranspose2d(b, b, 2, stride=2),
+            nn.Identity(),
+            nn.Conv2d(d, d, 3, stride=2, padding=1),
+        )
+    )
 
 
 class DPT(nn.Module):
@@ -69,16 +90,8 @@ class DPT(nn.Module):
         align_corners: bool = False,
     ):
         super().__init__()
-        a, b, _, d = level_dims
         self.project = nn.ModuleList(nn.Conv2d(t, n, 1) for t, n in zip(token_dims, level_dims, strict=True))
-        self.resize = nn.ModuleList(
-            (
-                nn.ConvTranspose2d(a, a, 4, stride=4),
-                nn.ConvTranspose2d(b, b, 2, stride=2),
-                nn.Identity(),
-                nn.Conv2d(d, d, 3, stride=2, padding=1),
-            )
-        )
+        self.resize = resizes(level_dims)
         self.level = nn.ModuleList(nn.Conv2d(n, feature, 3, padding=1, bias=False) for n in level_dims)
         self.fuse = nn.ModuleList(
             Fusion(feature, coarsest=i == 3, align_corners=align_corners) for i in range(4)
