@@ -35,10 +35,9 @@ def scene(photos, tmp_path_factory):
     return path
 
 
-def test_a_photo_taken_again_stands_where_it_stood(run, scene, photos, tmp_path):
+def test_a_photo_taken_again_stands_where_it_stood(done, scene, photos, tmp_path):
     output = tmp_path / "more.langflash"
-    outcome = run("add", scene, photos / "1.jpg", "-o", output)
-    assert outcome.code == 0, outcome.err
+    outcome = done("add", scene, photos / "1.jpg", "-o", output)
     assert "1 photo more, 3 in all" in outcome.out
     before, after = load(scene), load(output)
     assert after.record.photos == ("left.jpg", "right.jpg", "1.jpg") and len(after.photos) == 3

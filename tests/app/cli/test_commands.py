@@ -30,12 +30,11 @@ TORCH = ("--backend", "torch")
 
 
 @pytest.mark.parametrize("backend", ["torch", "gl"])
-def test_query(run, scene_file, tmp_path, backend):
+def test_query(done, scene_file, tmp_path, backend):
     out = tmp_path / "deep" / "out"
-    outcome = run(
+    outcome = done(
         "query", scene_file, "armchair", "submarine", "-o", out, "--json", "--npz", "--backend", backend
     )
-    assert outcome.code == 0, outcome.err
     document = outcome.json()
     assert document["backend"] == backend and document["view"] == 1 and document["mode"] == "relevancy"
     assert document["size"] == [WIDTH, HEIGHT] and document["unit"] == "scene"
@@ -116,14 +115,13 @@ def test_what_another_photo_shows_is_said(run, tmp_path):
     assert "photo 2" not in run("query", path, "armchair", "--view", 1, *TORCH).err  # asked of that one
 
 
-def test_query_without_a_folder_writes_nothing(run, scene_file, tmp_path, monkeypatch):
+def test_query_without_a_folder_writes_nothing(run, done, scene_file, tmp_path, monkeypatch):
     """The same numbers as with one, without the file at the end of the line."""
     kept = run("query", scene_file, "armchair", "submarine", "-o", tmp_path / "out", *TORCH)
     (tmp_path / "here").mkdir()
     monkeypatch.chdir(tmp_path / "here")
     beside = set(os.listdir(scene_file.parent))
-    outcome = run("query", scene_file, "armchair", "submarine", *TORCH)
-    assert outcome.code == 0, outcome.err
+    outcome = done("query", scene_file, "armchair", "submarine", *TORCH)
     assert outcome.out.splitlines() == [line.partition("  -> ")[0] for line in kept.out.splitlines()]
     assert outcome.out.startswith("found") and "% of the picture, at (" in outcome.out
     document = run("query", scene_file, "armchair", "--json", *TORCH).json()
@@ -134,7 +132,7 @@ def test_query_without_a_folder_writes_nothing(run, scene_file, tmp_path, monkey
     assert not os.listdir() and set(os.listdir(scene_file.parent)) == beside
 
 
-def test_what_a_phrase_may_not_mean_is_said(run, scene_file, tmp_path):
+def test_what_a_phrase_may_not_mean_is_said(run, done, scene_file, tmp_path):
     """On stderr and in the document, of whatever is asked; what it proposes takes the denied thing away."""
     words = ("no armchair", "armchiar", "wall - armchair")
     document = run("query", scene_file, *words, "-o", tmp_path / "out", "--json", *TORCH)
@@ -160,8 +158,8 @@ def test_what_a_phrase_may_not_mean_is_said(run, scene_file, tmp_path):
         ),
         ("query", "--scenes", scene_file.parent, "no armchair", "-o", tmp_path / "survey", *TORCH),
     ):
-        outcome = run(*command)
-        assert outcome.code == 0 and said[0] in outcome.err.splitlines(), (command, outcome.err)
+        outcome = done(*command)
+        assert said[0] in outcome.err.splitlines(), (command, outcome.err)
 
 
 def test_query_tells_how_it_reads_a_phrase(run, scene_file, tmp_path):
@@ -192,26 +190,26 @@ def test_query_by_cosine_with_own_negatives(run, scene_file, tmp_path):
     assert scores[0] < scores[1]  # a close rival leaves less
 
 
-def test_size_and_camera_file(run, scene_file, tmp_path):
+def test_size_and_camera_file(done, scene_file, tmp_path):
     camera = tmp_path / "camera.json"
     viewmat = np.eye(4).tolist()
     viewmat[2][3] = 0.5  # half a unit back
     K = [[35.0, 0.0, 28.0], [0.0, 35.0, 21.0], [0.0, 0.0, 1.0]]
     camera.write_text(json.dumps({"viewmat": viewmat, "K": K, "width": 56, "height": 42}))
     near, far = tmp_path / "near.png", tmp_path / "far.png"
-    assert run("render", scene_file, "-o", near, "--size", "80x60", *TORCH).code == 0
-    assert run("render", scene_file, "-o", far, "--camera", camera, "--size", "80x60", *TORCH).code == 0
+    done("render", scene_file, "-o", near, "--size", "80x60", *TORCH)
+    done("render", scene_file, "-o", far, "--camera", camera, "--size", "80x60", *TORCH)
     assert pixels(near).shape == pixels(far).shape == (60, 80, 3)
     assert (pixels(far).sum(-1) > 0).mean() < (pixels(near).sum(-1) > 0).mean()  # smaller from further away
 
 
-def test_pictures_have_the_size_of_the_photos(run, tmp_path):
+def test_pictures_have_the_size_of_the_photos(run, done, tmp_path):
     """Twice what the network saw; answers stay where they were."""
     stream = io.BytesIO()
     Image.new("RGB", (2 * WIDTH, 2 * HEIGHT)).save(stream, "JPEG")
     scene, full = tmp_path / "scene.langflash", (2 * HEIGHT, 2 * WIDTH)
     save(replace(stripes(), photos=(stream.getvalue(),) * 2), scene)
-    assert run("render", scene, "-o", tmp_path / "a.png", *TORCH).code == 0
+    done("render", scene, "-o", tmp_path / "a.png", *TORCH)
     assert pixels(tmp_path / "a.png").shape[:2] == full
     asked = run("query", scene, "armchair", "-o", tmp_path / "q", "--npz", "--json", *TORCH).json()
     assert asked["size"] == [*full[::-1]] and pixels(tmp_path / "q" / "armchair_heat.png").shape[:2] == full
@@ -224,15 +222,14 @@ def test_pictures_have_the_size_of_the_photos(run, tmp_path):
     assert abs(small["prompts"][0]["area"] - asked["prompts"][0]["area"]) <= 1 / WIDTH
     for name, what in (("coco.json", ""), ("numbers.npz", ""), ("mask.png", "mask"), ("cut.png", "")):
         said = ("--what", what) if what else ()
-        done = run("export", scene, "-o", tmp_path / name, "--prompt", "armchair", *said, *TORCH)
-        assert done.code == 0, done.err
+        done("export", scene, "-o", tmp_path / name, "--prompt", "armchair", *said, *TORCH)
     images = json.loads((tmp_path / "coco.json").read_text())["images"]
     assert [(image["height"], image["width"]) for image in images] == [full, full]
     assert np.load(tmp_path / "numbers.npz")["mask"].shape == (1, *full)
     for name in ("mask.png", "cut.png"):
         assert pixels(tmp_path / name).shape[:2] == full
     words = ("--segmented", "--prompt", "armchair", "--view", "2", *TORCH)
-    assert run("export", scene, "-o", tmp_path / "folder", *words).code == 0
+    done("export", scene, "-o", tmp_path / "folder", *words)
     assert pixels(tmp_path / "folder" / "photo_2" / "armchair_mask.png").shape == full
 
 
@@ -246,11 +243,10 @@ def test_pictures_have_the_size_of_the_photos(run, tmp_path):
         if picture.word
     ],
 )
-def test_render(run, scene_file, tmp_path, what, backend):
+def test_render(done, scene_file, tmp_path, what, backend):
     path = tmp_path / "new" / "a.png"
     words = ("render", scene_file, "-o", path, "--what", *what.split(), "--backend", backend, "--json")
-    outcome = run(*words)
-    assert outcome.code == 0, outcome.err
+    outcome = done(*words)
     document = outcome.json()
     assert document["file"] == str(path) and document["size"] == [WIDTH, HEIGHT]
     assert pixels(path).shape[:2] == (HEIGHT, WIDTH)
@@ -270,15 +266,12 @@ def aside_of(scene_file: Path, path: Path) -> Camera:
 
 @pytest.mark.parametrize("backend", ["gl", "torch"])
 @pytest.mark.parametrize("words", [("render",), ("export",), ("export", "--what", "rgb")])
-def test_gaps_are_filled_and_nothing_else(run, scene_file, tmp_path, backend, words):
+def test_gaps_are_filled_and_nothing_else(done, scene_file, tmp_path, backend, words):
     aside, path = tmp_path / "camera.json", tmp_path / "a.png"
     alphas = render(langflash_core.load(scene_file), aside_of(scene_file, aside)).alphas.numpy()
     pictures = []
     for fill in ([], ["--fill"]):
-        outcome = run(
-            words[0], scene_file, *words[1:], "-o", path, "--camera", aside, *fill, "--backend", backend
-        )
-        assert outcome.code == 0, outcome.err
+        done(words[0], scene_file, *words[1:], "-o", path, "--camera", aside, *fill, "--backend", backend)
         pictures.append(pixels(path).astype(int))
     plain, filled = pictures
     empty, covered = alphas < 0.01, alphas > 0.999
@@ -334,23 +327,22 @@ def of_photos(scene_file, tmp_path) -> Path:
 
 
 @pytest.mark.parametrize("backend", ["gl", "torch"])
-def test_what_no_photo_looked_at_from_there_fades(run, of_photos, tmp_path, backend):
+def test_what_no_photo_looked_at_from_there_fades(done, of_photos, tmp_path, backend):
     plain, aside = tmp_path / "plain.png", tmp_path / "camera.json"
     aside_of(of_photos, aside)
     pictures = {}
     for place in (["--view", "1"], ["--camera", str(aside)]):
         for fade in ([], ["--fade"]):
-            outcome = run("render", of_photos, "-o", plain, *place, *fade, "--backend", backend)
-            assert outcome.code == 0, outcome.err
+            done("render", of_photos, "-o", plain, *place, *fade, "--backend", backend)
             pictures[place[0], bool(fade)] = pixels(plain)
     assert np.array_equal(pictures["--view", True], pictures["--view", False])
     assert pictures["--camera", True].sum() < pictures["--camera", False].sum()
 
 
-def test_only_views_of_known_photos_fade(run, scene_file, of_photos, tmp_path):
+def test_only_views_of_known_photos_fade(run, done, scene_file, of_photos, tmp_path):
     outcome = run("export", of_photos, "-o", tmp_path / "a.ply", "--fade")
     assert outcome.code == 2 and "leave --fade out" in outcome.err
-    assert run("export", of_photos, "-o", tmp_path / "a.png", "--fade", *TORCH).code == 0
+    done("export", of_photos, "-o", tmp_path / "a.png", "--fade", *TORCH)
     outcome = run("export", scene_file, "-o", tmp_path / "b.png", "--fade", *TORCH)
     assert outcome.code == 2 and "leave --fade out" in outcome.err and not (tmp_path / "b.png").exists()
 
@@ -379,12 +371,11 @@ def test_labels_for_people(run, scene_file, tmp_path):
     assert "armchair #" in out and "moon #" in out and "(not found)" in out
 
 
-def test_export_picture_and_cut_out(run, scene_file, tmp_path):
-    assert run("export", scene_file, "-o", tmp_path / "a.png", *TORCH).code == 0
+def test_export_picture_and_cut_out(done, scene_file, tmp_path):
+    done("export", scene_file, "-o", tmp_path / "a.png", *TORCH)
     assert pixels(tmp_path / "a.png").shape == (HEIGHT, WIDTH, 3)
     words = ("--prompt", "armchair", "submarine", "--threshold", "0.8")
-    outcome = run("export", scene_file, "-o", tmp_path / "b.png", *words, *TORCH)
-    assert outcome.code == 0, outcome.err
+    done("export", scene_file, "-o", tmp_path / "b.png", *words, *TORCH)
     alphas = pixels(tmp_path / "b.png")[..., 3]
     assert alphas[:, : WIDTH // 4].mean() > 200 and alphas[:, WIDTH // 2 :].max() == 0
 
@@ -534,9 +525,8 @@ def test_help_and_version_answer_at_once():
     assert subprocess.run([sys.executable, "-c", code], timeout=60).returncode == 0
 
 
-def test_nothing_found_is_an_answer(run, scene_file, tmp_path):
-    outcome = run("query", scene_file, "submarine", "-o", tmp_path, "--json", *TORCH)
-    assert outcome.code == 0
+def test_nothing_found_is_an_answer(done, scene_file, tmp_path):
+    outcome = done("query", scene_file, "submarine", "-o", tmp_path, "--json", *TORCH)
     assert [entry["found"] for entry in outcome.json()["prompts"]] == [False]
 
 
@@ -572,12 +562,11 @@ def test_the_window_opens_a_folder_as_its_photos(tmp_path, monkeypatch):
         view.run(Namespace(paths=[tmp_path / "empty"]), io.StringIO())
 
 
-def test_heat_maps_are_coloured_as_asked(run, scene_file, tmp_path):
+def test_heat_maps_are_coloured_as_asked(run, done, scene_file, tmp_path):
     pictures = []
     for index, words in enumerate(([], ["--colormap", "grey"], ["--colormap", "grey", "--span", "0,1"])):
         path = tmp_path / f"{index}.png"
-        done = run("export", scene_file, "-o", path, "--what", "heat", "--prompt", "armchair", *words)
-        assert done.code == 0
+        done("export", scene_file, "-o", path, "--what", "heat", "--prompt", "armchair", *words)
         pictures.append(np.asarray(Image.open(path)))
     assert len({picture.tobytes() for picture in pictures}) == 3
     refused = run("export", scene_file, "-o", tmp_path / "x.png", "--colormap", "grey")

@@ -30,10 +30,10 @@ def walk(tmp_path_factory) -> Path:
     return films.write(tmp_path_factory.mktemp("film") / "walk.mp4", films.walk(40, 10.0))
 
 
-def test_a_folder_of_frames_named_by_their_times(run, walk: Path, tmp_path: Path) -> None:
+def test_a_folder_of_frames_named_by_their_times(done, walk: Path, tmp_path: Path) -> None:
     out, sheet = tmp_path / "frames", tmp_path / "sheet.png"
-    done = run("frames", walk, "-o", out, "--most", 6, "--sheet", sheet, "--json")
-    assert done.code == 0 and done.err == ""
+    done = done("frames", walk, "-o", out, "--most", 6, "--sheet", sheet, "--json")
+    assert done.err == ""
     document = done.json()
     names = sorted(path.name for path in out.glob("*.jpg"))
     assert names == [frame["file"] for frame in document["frames"]] and len(names) == 6
@@ -48,12 +48,12 @@ def test_a_folder_of_frames_named_by_their_times(run, walk: Path, tmp_path: Path
         assert picture.width > 400 and np.asarray(picture).std() > 20
 
 
-def test_the_folder_is_replaced_and_nothing_else_is(run, walk: Path, tmp_path: Path) -> None:
+def test_the_folder_is_replaced_and_nothing_else_is(run, done, walk: Path, tmp_path: Path) -> None:
     out = tmp_path / "frames"
-    assert run("frames", walk, "-o", out).code == 0
+    done("frames", walk, "-o", out)
     first = sorted(out.iterdir())
-    again = run("frames", walk, "-o", out, "--most", 3)
-    assert again.code == 0 and "3 of 40 frames; 37 lay between the chosen ones" in again.out
+    again = done("frames", walk, "-o", out, "--most", 3)
+    assert "3 of 40 frames; 37 lay between the chosen ones" in again.out
     assert sum(map(is_still, os.listdir(out))) == 3 < len(first) - 1
     (out / "diary.txt").write_text("mine")
     refused = run("frames", walk, "-o", out)
@@ -88,18 +88,17 @@ def test_a_film_of_nothing_writes_nothing(run, tmp_path: Path) -> None:
     assert not (tmp_path / "out").exists() and not (tmp_path / "a.langflash").exists()
 
 
-def test_a_scene_out_of_a_film(run, walk: Path, tmp_path: Path, monkeypatch) -> None:
+def test_a_scene_out_of_a_film(run, done, walk: Path, tmp_path: Path, monkeypatch) -> None:
     """Photos are called by film and time; a second scene of the same film decodes nothing."""
     scene = tmp_path / "room.langflash"
     words = ("reconstruct", walk, "-o", scene, "--frames", 3, "--size", 56, "--json")
-    done = run(*words)
-    assert done.code == 0, done.err
+    done = done(*words)
     (told,) = done.json()["films"]
     assert told["film"] == "walk.mp4" and told["chosen"] == 3 and told["left_out"]["between"] == 37
     info = run("info", scene, "--json").json()
     assert all(name.startswith("walk.mp4 @ ") and name.endswith(" s") for name in info["photos"])
     monkeypatch.setattr(Reader, "pictures", None)
-    assert run(*words).code == 0
+    done(*words)
 
 
 def test_films_beside_photos_share_the_room(walk: Path, tmp_path: Path) -> None:
@@ -124,7 +123,7 @@ def test_options_of_films_without_one(run, tmp_path: Path, words: list[str], sai
 
 
 @pytest.mark.skipif(sys.platform == "win32", reason="signals of POSIX")
-def test_killed_while_it_looks_it_leaves_nothing_and_begins_again(run, tmp_path: Path, home: Path) -> None:
+def test_killed_while_it_looks_it_leaves_nothing_and_begins_again(done, tmp_path: Path, home: Path) -> None:
     """Killed at once, in the middle of a film; and stopped by Ctrl-C."""
     film = films.write(tmp_path / "long.mp4", [films.seen(4.0 * (i % 300)) for i in range(900)])
     for number, code in ((signal.SIGKILL, -signal.SIGKILL), (signal.SIGINT, 130)):
@@ -140,5 +139,5 @@ def test_killed_while_it_looks_it_leaves_nothing_and_begins_again(run, tmp_path:
             assert running.wait(60) == code
         assert not (tmp_path / "out").exists()
     time.sleep(0.1)
-    assert run("frames", film, "-o", tmp_path / "out", "--to", 4).code == 0
+    done("frames", film, "-o", tmp_path / "out", "--to", 4)
     assert [path.name for path in (home / "films").iterdir() if path.name.startswith(".")] == []

@@ -15,10 +15,9 @@ def room_file(tmp_path_factory):
     return path
 
 
-def test_it_says_how_a_scene_stands_and_keeps_it(run, room_file, tmp_path):
+def test_it_says_how_a_scene_stands_and_keeps_it(run, done, room_file, tmp_path):
     out = tmp_path / "new" / "level.langflash"
-    done = run("level", room_file, "-o", out)
-    assert done.code == 0, done.err
+    done = done("level", room_file, "-o", out)
     assert "floor found" in done.out and "scale guessed from door and ceiling" in done.out
     world = load(out).record.world
     assert world is not None and world.guess is not None and load(out).record.metric_scale is None
@@ -29,10 +28,10 @@ def test_it_says_how_a_scene_stands_and_keeps_it(run, room_file, tmp_path):
     assert again["world"]["turn"] == list(world.turn) and again["metric_scale"] is None
 
 
-def test_a_known_length_puts_metres_into_the_scene(run, room_file, tmp_path):
+def test_a_known_length_puts_metres_into_the_scene(run, done, room_file, tmp_path):
     out = tmp_path / "level.langflash"
-    done = run("level", room_file, "--ceiling", "2.6", "-o", out)
-    assert done.code == 0 and "as you said" in done.out
+    done = done("level", room_file, "--ceiling", "2.6", "-o", out)
+    assert "as you said" in done.out
     assert "guessed" not in done.out + run("info", out).out, "two lengths of a unit, and one is wrong"
     assert load(out).record.metric_scale == pytest.approx(METRES, rel=0.02)
     done = run("level", room_file, "--length", "0,0,0", "0,0,1.5", "3", "--json")
@@ -41,12 +40,11 @@ def test_a_known_length_puts_metres_into_the_scene(run, room_file, tmp_path):
     assert done.json()["metric_scale"] > 0
 
 
-def test_an_upright_export_stands_level_in_metres_in_every_kind_of_file(run, room_file, tmp_path):
+def test_an_upright_export_stands_level_in_metres_in_every_kind_of_file(run, done, room_file, tmp_path):
     level = tmp_path / "level.langflash"
-    assert run("level", room_file, "--ceiling", "2.6", "-o", level).code == 0
+    done("level", room_file, "--ceiling", "2.6", "-o", level)
     for name in ("room.ply", "room.langflash", "room.splat", "room.glb", "room.spz", "room.sog"):
-        done = run("export", level, "--upright", "-o", tmp_path / name)
-        assert done.code == 0, done.err
+        done("export", level, "--upright", "-o", tmp_path / name)
         heights = -read(tmp_path / name).gaussians.means[:, 1].numpy()
         assert abs(np.quantile(heights, 0.005)) < 0.08 and abs(np.quantile(heights, 0.995) - 2.6) < 0.08
     plain, stood = tmp_path / "plain.ply", tmp_path / "after.ply"
@@ -82,11 +80,11 @@ def test_upright_needs_a_world_and_a_file_of_gaussians(run, room_file, tmp_path)
     assert done.code == 2 and "--upright is for" in done.err
 
 
-def test_it_may_be_kept_in_the_scene_itself(run, room_file, tmp_path):
+def test_it_may_be_kept_in_the_scene_itself(run, done, room_file, tmp_path):
     own = tmp_path / "own.langflash"
     own.write_bytes(room_file.read_bytes())
     assert run("level", own, "-o", own).code == 0 and load(own).record.world is not None
     splats = tmp_path / "own.ply"
-    assert run("export", own, "-o", splats).code == 0
+    done("export", own, "-o", splats)
     before = splats.read_bytes()
     assert run("level", splats, "-o", splats).code == 2 and splats.read_bytes() == before

@@ -25,10 +25,9 @@ def scene(scene_file, tmp_path):
     return shutil.copy(scene_file, tmp_path / "room.langflash")
 
 
-def test_a_tour_from_nothing_to_json_and_back(run, scene, tmp_path):
+def test_a_tour_from_nothing_to_json_and_back(done, scene, tmp_path):
     def done(*words) -> str:
-        outcome = run("tour", *words)
-        assert outcome.code == 0, outcome.err
+        outcome = done("tour", *words)
         return outcome.out
 
     assert "no tour" in done("list", scene)
@@ -54,9 +53,8 @@ def test_a_tour_from_nothing_to_json_and_back(run, scene, tmp_path):
     assert torch.equal(load(other).gaussians.means, stripes().gaussians.means)
 
 
-def test_a_note_finds_its_place_by_a_phrase(run, scene):
-    outcome = run("tour", "note", scene, "--phrase", "armchair", *TORCH)
-    assert outcome.code == 0, outcome.err
+def test_a_note_finds_its_place_by_a_phrase(done, scene):
+    done("tour", "note", scene, "--phrase", "armchair", *TORCH)
     (note,) = tour_in(scene)[0].notes
     x, _, z = note.at
     assert note.text == note.phrase == "armchair" and -0.8 < x < -0.3 and z == pytest.approx(1, abs=0.05)

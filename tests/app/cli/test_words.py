@@ -30,16 +30,15 @@ def folder(tmp_path_factory):
     return root
 
 
-def test_what_one_scene_was_taught_another_takes(run, folder, tmp_path):
+def test_what_one_scene_was_taught_another_takes(run, done, folder, tmp_path):
     words, taught = tmp_path / "mine.words.json", tmp_path / "taught.langflash"
-    learned = run("words", "learn", folder / "first.langflash", folder / "third.langflash", "-o", words)
-    assert learned.code == 0 and "learned 2" in learned.out, learned.err
+    learned = done("words", "learn", folder / "first.langflash", folder / "third.langflash", "-o", words)
+    assert "learned 2" in learned.out
     again = run("words", "learn", folder / "first.langflash", "-o", words, "--json").json()
     assert again["learned"] == 2 and again["words"] == 2 == len(read_lessons(words))  # not twice
     assert "heirloom" in run("words", "list", words).out
 
-    told = run("words", "teach", folder / "second.langflash", words, "-o", taught, "--json")
-    assert told.code == 0, told.err
+    told = done("words", "teach", folder / "second.langflash", words, "-o", taught, "--json")
     groups = {group["group"]: group for group in told.json()["groups"]}
     assert groups[0]["name"] == "heirloom" and groups[2]["denied"] == ["wooden floor"] and 1 not in groups
     assert load(taught).record.atom_names == {0: "heirloom"}
@@ -62,11 +61,10 @@ def test_nothing_taught_or_no_photo_is_one_sentence_and_writes_nothing(run, fold
     assert outcome.code == 2 and "no photos" in outcome.err and not (tmp_path / "no.langflash").exists()
 
 
-def test_phrases_of_many_scenes_in_one_table(run, folder, tmp_path):
+def test_phrases_of_many_scenes_in_one_table(done, folder, tmp_path):
     phrases, out = tmp_path / "phrases.txt", tmp_path / "out"
     phrases.write_text("submarine\n\n# not this\narmchair\n")
-    outcome = run("query", "--scenes", folder, "--prompts", phrases, "-o", out, "--json", *TORCH)
-    assert outcome.code == 0, outcome.err
+    outcome = done("query", "--scenes", folder, "--prompts", phrases, "-o", out, "--json", *TORCH)
     left_out, untaught = outcome.err.splitlines()
     assert "deep/broken was left out" in left_out and '"submarine" is no thing' in untaught
     document = json.loads((out / "answers.json").read_text())
