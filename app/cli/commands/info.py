@@ -1,6 +1,7 @@
 """`langflash info`: what a scene file holds; with --limits, how much of a file is let in."""
 
 from argparse import Namespace
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, TextIO
 
@@ -27,7 +28,11 @@ def run(args: Namespace, out: TextIO) -> None:
         **_described(args.scene, args.axes),
         "file_bytes": args.scene.stat().st_size,
     }
-    return tell(args, document, _lines(_for_people(_in_words(document))), out)
+    return tell(args, document, _told(document), out)
+
+
+def _told(document: dict[str, Any]) -> Iterator[str]:
+    yield from _lines(_for_people(_in_words(document)))
 
 
 def _tell_limits(args: Namespace, out: TextIO) -> None:

@@ -2,6 +2,8 @@
 
 import io
 import json
+import subprocess
+import sys
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -69,6 +71,12 @@ def refused(run, tmp_path):
         return outcome.err
 
     return command
+
+
+def shell(*words, **how) -> subprocess.CompletedProcess[str]:
+    """A command in a process of its own."""
+    program = [sys.executable, "-m", "langflash_core", *map(str, words)]
+    return subprocess.run(program, capture_output=True, text=True, timeout=60, **how)
 
 
 def _content(folder: Path) -> dict[Path, bytes]:

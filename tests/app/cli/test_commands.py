@@ -24,7 +24,7 @@ from langflash_core.errors import ImageError
 from langflash_core.scene.file import load, save
 from langflash_core.splat import render
 from langflash_core.types import Camera
-from tests.app.cli.conftest import HEIGHT, WIDTH, WORDS, pixels, stripes
+from tests.app.cli.conftest import HEIGHT, WIDTH, WORDS, pixels, shell, stripes
 
 TORCH = ("--backend", "torch")
 
@@ -54,34 +54,19 @@ def test_query(done, scene_file, tmp_path, backend):
     assert pixels(out / "armchair_mask.png")[:, : WIDTH // 4].mean() > 200
     assert pixels(out / "submarine_mask.png").max() == 0
     arrays = np.load(chair["files"]["npz"])
-    kinds = {name: (arrays[name].shape, str(arrays[name].dtype)) for name in arrays}
-    assert (
-        kinds.items()
-        >= {
-            "relevance": ((2, HEIGHT, WIDTH), "float32"),
-            "mask": ((2, HEIGHT, WIDTH), "bool"),
-            "depth": ((HEIGHT, WIDTH), "float32"),
-            "rgb": ((HEIGHT, WIDTH, 3), "uint8"),
-        }.items()
-    )
+    size = (HEIGHT, WIDTH)
+    kinds = {"relevance": (2, *size), "mask": (2, *size), "depth": size, "rgb": (*size, 3)}
+    assert {name: arrays[name].shape for name in kinds} == kinds
+    types = [str(arrays[name].dtype) for name in kinds]
+    assert types == ["float32", "bool", "float32", "uint8"]
     assert np.array_equal(arrays["mask"][0] * 255, pixels(out / "armchair_mask.png"))
 
 
 def test_backends_agree(run, scene_file, tmp_path):
     arrays = {}
     for backend in ("torch", "gl"):
-        run(
-            "query",
-            scene_file,
-            *WORDS,
-            "-o",
-            tmp_path / backend,
-            "--npz",
-            "--backend",
-            backend,
-            "--view",
-            "2",
-        )
+        words = ("--npz", "--view", "2", "--backend", backend)
+        run("query", scene_file, *WORDS, "-o", tmp_path / backend, *words)
         arrays[backend] = np.load(tmp_path / backend / "query.npz")
     exact, drawn = arrays["torch"], arrays["gl"]
     # The project's own promise: relevance within 0.005 on average, colours within 45 dB.
@@ -142,20 +127,11 @@ def test_what_a_phrase_may_not_mean_is_said(run, done, scene_file, tmp_path):
     assert minus["score"] < negated["score"]
     said = [f"warning: {entry['note']}" for entry in (negated, slip)]
     assert document.err.splitlines() == said
+    heat = ("--what", "relevance", "--prompt", "no armchair")
     for command in (
         ("export", scene_file, "-o", tmp_path / "a.ply", "--prompt", "no armchair"),
         ("hide", scene_file, "no armchair", "-o", tmp_path / "hidden.langflash", *TORCH),
-        (
-            "render",
-            scene_file,
-            "--what",
-            "relevance",
-            "--prompt",
-            "no armchair",
-            "-o",
-            tmp_path / "a.png",
-            *TORCH,
-        ),
+        ("render", scene_file, *heat, "-o", tmp_path / "a.png", *TORCH),
         ("query", "--scenes", scene_file.parent, "no armchair", "-o", tmp_path / "survey", *TORCH),
     ):
         outcome = done(*command)
@@ -181,13 +157,9 @@ def test_query_by_cosine_with_own_negatives(run, scene_file, tmp_path):
     cosine = run("query", scene_file, "armchair", "-o", tmp_path, "--mode", "cosine", "--json", *TORCH).json()
     assert cosine["mode"] == "cosine"
     assert cosine["prompts"][0]["score"] == pytest.approx(1.0, abs=1e-3)  # the atom is that very phrase
-    scores = [
-        run("query", scene_file, "armchair", "-o", tmp_path, "--json", *TORCH, "--negatives", word).json()[
-            "prompts"
-        ][0]["score"]
-        for word in ("sofa", "moon")
-    ]
-    assert scores[0] < scores[1]  # a close rival leaves less
+    asked = ("query", scene_file, "armchair", "-o", tmp_path, "--json", *TORCH, "--negatives")
+    close, far = (run(*asked, word).json()["prompts"][0]["score"] for word in ("sofa", "moon"))
+    assert close < far  # a close rival leaves less
 
 
 def test_size_and_camera_file(done, scene_file, tmp_path):
@@ -214,9 +186,8 @@ def test_pictures_have_the_size_of_the_photos(run, done, tmp_path):
     asked = run("query", scene, "armchair", "-o", tmp_path / "q", "--npz", "--json", *TORCH).json()
     assert asked["size"] == [*full[::-1]] and pixels(tmp_path / "q" / "armchair_heat.png").shape[:2] == full
     assert np.load(tmp_path / "q" / "query.npz")["mask"].shape == (1, *full)
-    small = run(
-        "query", scene, "armchair", "-o", tmp_path / "s", "--size", f"{WIDTH}x{HEIGHT}", "--json", *TORCH
-    ).json()
+    words = ("-o", tmp_path / "s", "--size", f"{WIDTH}x{HEIGHT}", "--json", *TORCH)
+    small = run("query", scene, "armchair", *words).json()
     assert small["size"] == [WIDTH, HEIGHT]
     # A pixel of the smaller picture is 1 / WIDTH of it, and the stripe has one edge inside.
     assert abs(small["prompts"][0]["area"] - asked["prompts"][0]["area"]) <= 1 / WIDTH
@@ -295,25 +266,16 @@ def test_filled_gaps_are_under_a_heat_map_and_answer_nothing(run, scene_file, tm
 @pytest.mark.parametrize(
     "words",
     [
-        ("export", "a.png", "--prompt", "armchair"),
-        ("export", "a.png", "--what", "cutout", "--prompt", "armchair"),
-        ("export", "a.png", "--what", "mask", "--prompt", "armchair"),
-        ("export", "a.png", "--what", "depth"),
-        ("export", "a.exr"),
-        ("export", "a.npz"),
-        ("export", "a.ply"),
-        ("export", "a.html"),
-        ("export", "a.mp4", "--prompt", "armchair"),
-        ("export", "folder", "--segmented", "--prompt", "armchair"),
-        ("render", "a.png", "--what", "depth"),
-        ("render", "a.png", "--what", "atoms"),
+        *(f"export a.png {words} --prompt armchair" for words in ("", "--what cutout", "--what mask")),
+        *("export a.png --what depth", "export a.exr", "export a.npz", "export a.ply", "export a.html"),
+        *("export a.mp4 --prompt armchair", "export folder --segmented --prompt armchair"),
+        *("render a.png --what depth", "render a.png --what atoms"),
     ],
 )
-def test_only_colours_of_the_whole_scene_have_gaps_to_fill(run, scene_file, tmp_path, words):
-    command, name, *more = words
-    outcome = run(command, scene_file, "-o", tmp_path / name, *more, "--fill")
-    assert outcome.code == 2 and len(outcome.err.strip().splitlines()) == 1
-    assert "--fill" in outcome.err and "; leave " in outcome.err and not (tmp_path / name).exists()
+def test_only_colours_of_the_whole_scene_have_gaps_to_fill(refused, scene_file, tmp_path, words):
+    command, name, *more = words.split()
+    said = refused(command, scene_file, "-o", tmp_path / name, *more, "--fill")
+    assert "--fill" in said and "; leave " in said
 
 
 @pytest.fixture
@@ -339,12 +301,10 @@ def test_what_no_photo_looked_at_from_there_fades(done, of_photos, tmp_path, bac
     assert pictures["--camera", True].sum() < pictures["--camera", False].sum()
 
 
-def test_only_views_of_known_photos_fade(run, done, scene_file, of_photos, tmp_path):
-    outcome = run("export", of_photos, "-o", tmp_path / "a.ply", "--fade")
-    assert outcome.code == 2 and "leave --fade out" in outcome.err
+def test_only_views_of_known_photos_fade(done, refused, scene_file, of_photos, tmp_path):
+    assert "leave --fade out" in refused("export", of_photos, "-o", tmp_path / "a.ply", "--fade")
     done("export", of_photos, "-o", tmp_path / "a.png", "--fade", *TORCH)
-    outcome = run("export", scene_file, "-o", tmp_path / "b.png", "--fade", *TORCH)
-    assert outcome.code == 2 and "leave --fade out" in outcome.err and not (tmp_path / "b.png").exists()
+    assert "leave --fade out" in refused("export", scene_file, "-o", tmp_path / "b.png", "--fade", *TORCH)
 
 
 def test_rendered_weights_are_the_stripe(run, scene_file, tmp_path):
@@ -356,18 +316,8 @@ def test_rendered_weights_are_the_stripe(run, scene_file, tmp_path):
 
 
 def test_labels_for_people(run, scene_file, tmp_path):
-    out = run(
-        "render",
-        scene_file,
-        "-o",
-        tmp_path / "a.png",
-        "--what",
-        "labels",
-        "--prompt",
-        "armchair",
-        "moon",
-        *TORCH,
-    ).out
+    words = ("--what", "labels", "--prompt", "armchair", "moon", *TORCH)
+    out = run("render", scene_file, "-o", tmp_path / "a.png", *words).out
     assert "armchair #" in out and "moon #" in out and "(not found)" in out
 
 
@@ -410,13 +360,8 @@ def test_info_says_of_pruning_what_it_changed(run, scene_file, tmp_path):
     assert run("info", path, "--json").json()["pruning"] == report
     lines = run("info", path).out.split("pruning:\n")[1].splitlines()
     said = [line.strip() for line in lines if line.startswith("  ")]
-    assert said == [
-        "gaussians before: 9",
-        "faint: 2",
-        "gaussians after: 7",
-        "weights above 0 before: 20",
-        "weights above 0 after: 9,000",
-    ]
+    kept, weights = ["gaussians before: 9", "faint: 2", "gaussians after: 7"], "weights above 0"
+    assert said == [*kept, f"{weights} before: 20", f"{weights} after: 9,000"]
 
 
 def test_info_tells_a_light_that_shows(run, scene_file, tmp_path):
@@ -433,22 +378,7 @@ def test_info_tells_a_light_that_shows(run, scene_file, tmp_path):
 
 
 def test_json_is_all_of_stdout(scene_file, tmp_path):
-    done = subprocess.run(
-        [
-            sys.executable,
-            "-m",
-            "langflash_core",
-            "query",
-            scene_file,
-            "armchair",
-            "-o",
-            tmp_path / "o",
-            "--json",
-        ],
-        capture_output=True,
-        text=True,
-        timeout=60,
-    )
+    done = shell("query", scene_file, "armchair", "-o", tmp_path / "o", "--json")
     assert done.returncode == 0, done.stderr
     assert json.loads(done.stdout)["prompts"][0]["found"]
 
@@ -456,15 +386,13 @@ def test_json_is_all_of_stdout(scene_file, tmp_path):
 @pytest.mark.skipif(sys.platform != "linux", reason="EGL is Linux's")
 def test_without_opengl(scene_file, tmp_path):
     """Hide every EGL driver: gl by default gives way with a warning, gl by choice is an error."""
-    words = [sys.executable, "-m", "langflash_core", "render", scene_file, "-o", tmp_path / "a.png"]
+    words = ("render", scene_file, "-o", tmp_path / "a.png")
     hidden = {**os.environ, "__EGL_VENDOR_LIBRARY_FILENAMES": "/dev/null"}
-    given_way = subprocess.run(words, capture_output=True, text=True, env=hidden, timeout=60)
+    given_way = shell(*words, env=hidden)
     assert given_way.returncode == 0
     assert given_way.stderr.startswith("warning: ") and "torch" in given_way.stderr
     (tmp_path / "a.png").unlink()
-    asked = subprocess.run(
-        [*words, "--backend", "gl"], capture_output=True, text=True, env=hidden, timeout=60
-    )
+    asked = shell(*words, "--backend", "gl", env=hidden)
     assert asked.returncode == 1
     assert asked.stderr.startswith("langflash: ") and asked.stderr.count("\n") == 1
     assert not os.listdir(tmp_path)
@@ -476,17 +404,7 @@ def test_interrupted_at_a_terminal(scene_file, tmp_path):
     import pty
 
     terminal, side = pty.openpty()
-    words = [
-        "query",
-        scene_file,
-        "armchair",
-        "-o",
-        tmp_path / "out",
-        "--backend",
-        "torch",
-        "--size",
-        "8192x8192",
-    ]
+    words = ["query", scene_file, "armchair", "-o", tmp_path / "out", *TORCH, "--size", "8192x8192"]
     # Tests that a shell runs in the background ignore Ctrl-C, and a child would inherit that;
     # a handler of our own becomes the system's default in it.
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
@@ -516,9 +434,7 @@ def test_help_and_version_answer_at_once():
     """No torch, no OpenGL: 0.3 s are promised; three times that on a machine busy with other tests."""
     for words in ([], ["--help"], ["--version"], ["query", "--size"]):
         start = time.perf_counter()
-        done = subprocess.run(
-            [sys.executable, "-m", "langflash_core", *words], capture_output=True, timeout=60
-        )
+        done = shell(*words)
         assert time.perf_counter() - start < 0.9
         assert done.returncode == (2 if "query" in words else 0)
     code = "import sys, app.cli.parser; sys.exit(bool({'torch', 'numpy', 'moderngl'} & set(sys.modules)))"
@@ -542,11 +458,10 @@ def test_window_needs_a_display(scene_file, tmp_path):
     if sys.platform != "linux":
         pytest.skip("elsewhere there is always a screen")
     hidden = {name: value for name, value in os.environ.items() if name not in ("DISPLAY", "WAYLAND_DISPLAY")}
-    words = [sys.executable, "-m", "langflash_core", "view"]
-    done = subprocess.run([*words, scene_file], capture_output=True, text=True, env=hidden, timeout=60)
+    done = shell("view", scene_file, env=hidden)
     assert done.returncode == 1, done.stderr
     assert done.stderr.startswith("langflash: ") and done.stderr.count("\n") == 1
-    missing = subprocess.run([*words, "gone.jpg"], capture_output=True, text=True, env=hidden, timeout=60)
+    missing = shell("view", "gone.jpg", env=hidden)
     assert missing.returncode == 2 and "gone.jpg" in missing.stderr
 
 

@@ -53,7 +53,7 @@ def test_photos_with_poses_give_a_scene_in_their_world(done, tmp_path):
     assert "do not look" not in right.err
 
 
-def test_words_about_poses_that_do_not_go_together(run, tmp_path):
+def test_words_about_poses_that_do_not_go_together(refused, tmp_path):
     photos, _ = stereo_pair(tmp_path)
     poses = ("--poses", tmp_path / "transforms.json")
     for words, hint in (
@@ -63,9 +63,7 @@ def test_words_about_poses_that_do_not_go_together(run, tmp_path):
         (("reconstruct", photos[0].with_name("aloe_left.jpg"), *poses), "no pose of aloe_left.jpg"),
         (("lift", photos[0], "--photos", photos[0]), "--poses"),
     ):
-        outcome = run(*words, "-o", tmp_path / "a.langflash")
-        assert outcome.code == 2 and hint in outcome.err and outcome.err.count("\n") == 1, outcome.err
-    assert not (tmp_path / "a.langflash").exists()
+        assert hint in refused(*words, "-o", tmp_path / "a.langflash")
 
 
 @pytest.mark.slow

@@ -136,9 +136,7 @@ def test_a_phrase_keeps_its_gaussians(done, scene_file, tmp_path, suffix):
     done("export", scene_file, "-o", path, "--prompt", "armchair", "--threshold", "0.8")
     scene, whole = read(path), stripes()
     left = whole.gaussians.means[whole.semantics.weight_ids[:, 0] == 0]
-    assert torch.allclose(
-        scene.gaussians.means, left, atol=1e-5
-    )  # the left third, all of it and nothing else
+    assert torch.allclose(scene.gaussians.means, left, atol=1e-5)  # the left third, and nothing else
     if suffix in (".langflash", ".ply", ".glb"):
         assert scene.semantics.num_atoms == 3 and scene.num_views == 2
 
@@ -413,18 +411,14 @@ def test_the_least_detail_of_a_scene_without_levels_is_a_third(run, ply_file, tm
 @pytest.mark.parametrize(
     "words",
     [
-        ("-o", "a.png"),
-        ("-o", "transforms.json"),
-        ("-o", "a.npz"),
-        ("-o", "a.mp4"),
-        ("-o", "a.json", "--prompt", "armchair"),
-        ("-o", "a.glb", "--what", "boxes", "--prompt", "armchair"),
-        ("-o", "a.glb", "--what", "surface", "--prompt", "armchair"),
-        ("-o", "folder", "--segmented", "--prompt", "armchair"),
+        *("a.png", "transforms.json", "a.npz", "a.mp4", "a.json --prompt armchair"),
+        *(f"a.glb --prompt armchair --what {what}" for what in ("boxes", "surface")),
+        "folder --prompt armchair --segmented",
     ],
 )
 def test_the_least_detail_is_of_gaussians_alone(refused, scene_file, tmp_path, words):
-    said = refused("export", scene_file, "-o", tmp_path / words[1], *words[2:], "--detail", "low")
+    name, *more = words.split()
+    said = refused("export", scene_file, "-o", tmp_path / name, *more, "--detail", "low")
     assert "--detail low is for splats, scenes and web pages" in said
 
 
