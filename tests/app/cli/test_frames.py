@@ -20,9 +20,10 @@ from tests import films
 
 
 @pytest.fixture(autouse=True)
-def home(monkeypatch, tmp_path: Path) -> Path:
-    monkeypatch.setenv("LANGFLASH_HOME", str(tmp_path / "home"))
-    return tmp_path / "home"
+def home(monkeypatch, tmp_path_factory) -> Path:
+    folder = tmp_path_factory.mktemp("home")
+    monkeypatch.setenv("LANGFLASH_HOME", str(folder))
+    return folder
 
 
 @pytest.fixture(scope="module")
@@ -32,9 +33,9 @@ def walk(tmp_path_factory) -> Path:
 
 def test_a_folder_of_frames_named_by_their_times(done, walk: Path, tmp_path: Path) -> None:
     out, sheet = tmp_path / "frames", tmp_path / "sheet.png"
-    done = done("frames", walk, "-o", out, "--most", 6, "--sheet", sheet, "--json")
-    assert done.err == ""
-    document = done.json()
+    outcome = done("frames", walk, "-o", out, "--most", 6, "--sheet", sheet, "--json")
+    assert outcome.err == ""
+    document = outcome.json()
     names = sorted(path.name for path in out.glob("*.jpg"))
     assert names == [frame["file"] for frame in document["frames"]] and len(names) == 6
     assert names == [f"walk.mp4 @ {frame['seconds']:.2f} s.jpg" for frame in document["frames"]]
@@ -91,8 +92,8 @@ def test_a_scene_out_of_a_film(run, done, walk: Path, tmp_path: Path, monkeypatc
     """Photos are called by film and time; a second scene of the same film decodes nothing."""
     scene = tmp_path / "room.langflash"
     words = ("reconstruct", walk, "-o", scene, "--frames", 3, "--size", 56, "--json")
-    done = done(*words)
-    (told,) = done.json()["films"]
+    outcome = done(*words)
+    (told,) = outcome.json()["films"]
     assert told["film"] == "walk.mp4" and told["chosen"] == 3 and told["left_out"]["between"] == 37
     info = run("info", scene, "--json").json()
     assert all(name.startswith("walk.mp4 @ ") and name.endswith(" s") for name in info["photos"])

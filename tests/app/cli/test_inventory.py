@@ -17,8 +17,8 @@ def room_file(tmp_path_factory):
 
 
 def test_it_lists_what_is_there_and_writes_what_is_asked_for(run, done, room_file, tmp_path):
-    done = done("inventory", room_file, "-o", tmp_path / "a" / "room.csv", tmp_path / "room.svg")
-    assert "table 1" in done.out and "1.4" in done.out and "as they were told" in done.out
+    outcome = done("inventory", room_file, "-o", tmp_path / "a" / "room.csv", tmp_path / "room.svg")
+    assert "table 1" in outcome.out and "1.4" in outcome.out and "as they were told" in outcome.out
     assert (tmp_path / "a" / "room.csv").is_file() and (tmp_path / "room.svg").is_file()
     said = run("inventory", room_file, "--json").json()
     assert said["counts"] == {"chair": 2, "door": 1, "table": 1} and len(said["things"]) == 4
@@ -26,8 +26,8 @@ def test_it_lists_what_is_there_and_writes_what_is_asked_for(run, done, room_fil
 
 def test_names_are_kept_in_the_scene(run, done, room_file, tmp_path):
     named, again = tmp_path / "named.langflash", tmp_path / "again.langflash"
-    done = done("inventory", room_file, "--name", "chair 1=Oma's chair", "-o", named)
-    assert "Oma's chair (chair 1)" in done.out
+    outcome = done("inventory", room_file, "--name", "chair 1=Oma's chair", "-o", named)
+    assert "Oma's chair (chair 1)" in outcome.out
     assert load(named).record.thing_names == {"chair 1": "Oma's chair"} and load(named).record.world
     assert "Oma's chair" in run("inventory", named).out
     done("inventory", named, "--name", "chair 1=", "-o", again)
@@ -40,12 +40,12 @@ def test_two_scenes_of_one_room_are_compared(run, done, room_file, tmp_path):
     save(textured, before)
     moved = ((CHAIRS[0][0] + 0.7, CHAIRS[0][1]), CHAIRS[1])
     save(with_photos(_speckled(box_room(chairs=moved).with_record(metric_scale=METRES))), after)
-    done = done("inventory", before, "--beside", after, "--json", "--backend", "torch")
-    said = json.loads(done.out)["beside"]
+    outcome = done("inventory", before, "--beside", after, "--json", "--backend", "torch")
+    said = json.loads(outcome.out)["beside"]
     assert [round(pair["by"], 1) for pair in said["moved"]] == [0.7]
     assert not said["came"] and not said["went"] and said["matches"] > 12
-    done = run("inventory", room_file, "--beside", after)
-    assert done.code == 2 and "photos" in done.err
+    outcome = run("inventory", room_file, "--beside", after)
+    assert outcome.code == 2 and "photos" in outcome.err
 
 
 def _speckled(scene):

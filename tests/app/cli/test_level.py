@@ -17,8 +17,8 @@ def room_file(tmp_path_factory):
 
 def test_it_says_how_a_scene_stands_and_keeps_it(run, done, room_file, tmp_path):
     out = tmp_path / "new" / "level.langflash"
-    done = done("level", room_file, "-o", out)
-    assert "floor found" in done.out and "scale guessed from door and ceiling" in done.out
+    outcome = done("level", room_file, "-o", out)
+    assert "floor found" in outcome.out and "scale guessed from door and ceiling" in outcome.out
     world = load(out).record.world
     assert world is not None and world.guess is not None and load(out).record.metric_scale is None
     told = run("info", out)
@@ -30,14 +30,14 @@ def test_it_says_how_a_scene_stands_and_keeps_it(run, done, room_file, tmp_path)
 
 def test_a_known_length_puts_metres_into_the_scene(run, done, room_file, tmp_path):
     out = tmp_path / "level.langflash"
-    done = done("level", room_file, "--ceiling", "2.6", "-o", out)
-    assert "as you said" in done.out
-    assert "guessed" not in done.out + run("info", out).out, "two lengths of a unit, and one is wrong"
+    outcome = done("level", room_file, "--ceiling", "2.6", "-o", out)
+    assert "as you said" in outcome.out
+    assert "guessed" not in outcome.out + run("info", out).out, "two lengths of a unit, and one is wrong"
     assert load(out).record.metric_scale == pytest.approx(METRES, rel=0.02)
-    done = run("level", room_file, "--length", "0,0,0", "0,0,1.5", "3", "--json")
-    assert done.json()["metric_scale"] == pytest.approx(2.0)
-    done = run("level", room_file, "--length", "1:20,30", "1:70,30", "3", "--json")
-    assert done.json()["metric_scale"] > 0
+    outcome = run("level", room_file, "--length", "0,0,0", "0,0,1.5", "3", "--json")
+    assert outcome.json()["metric_scale"] == pytest.approx(2.0)
+    outcome = run("level", room_file, "--length", "1:20,30", "1:70,30", "3", "--json")
+    assert outcome.json()["metric_scale"] > 0
 
 
 def test_an_upright_export_stands_level_in_metres_in_every_kind_of_file(run, done, room_file, tmp_path):
