@@ -7,23 +7,28 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from langflash_core.language.relevance import CompiledQuery
 from langflash_core.surface.settings import PRUNING
 
 from .cases import Case
 from .errors import Errors
-from .measure import Result, Times
+from .measure import Result, Stages, Times
 from .modes import Mode, described_default
 
 FORMAT = 1
-COLUMNS = (
-    "mode", "axis", "ms_median", "ms_p95", "times_default", "cpu_ms_median", "gpu_ms_median",
-    "query_ms", "phrase_ms", "psnr_db", "relevance_mean", "relevance_max", "mask_iou",
-)  # fmt: skip
-_HEADINGS = (
-    "mode", "ms", "p95", "x default", "CPU ms", "GPU ms", "query ms", "phrase ms",
-    "PSNR dB", "rel. mean", "rel. max", "mask IoU",
-)  # fmt: skip
+_NUMBERS = {  # of a row: its column's heading in the table, and its format there
+    "ms_median": ("ms", ".1f"),
+    "ms_p95": ("p95", ".1f"),
+    "times_default": ("x default", ".3f"),
+    "cpu_ms_median": ("CPU ms", ".1f"),
+    "gpu_ms_median": ("GPU ms", ".1f"),
+    "query_ms": ("query ms", ".2f"),
+    "phrase_ms": ("phrase ms", ".2f"),
+    "psnr_db": ("PSNR dB", ".1f"),
+    "relevance_mean": ("rel. mean", ".1e"),
+    "relevance_max": ("rel. max", ".1e"),
+    "mask_iou": ("mask IoU", ".4f"),
+}
+COLUMNS = ("mode", "axis", *_NUMBERS)
 
 
 def document(machine: dict, results: Sequence[Result]) -> dict:
@@ -61,26 +66,21 @@ def table(document: dict) -> str:
 def _case(result: Result) -> dict:
     case, stages = result.case, result.stages
     width, height = case.size
+    phrases = list(case.compiled.texts)
     base = result.rows[0][1].frames
     return {
-        "name": f"{case.name}, {width} x {height}, {_count(case.compiled)}",
+        "name": f"{case.name}, {width} x {height}, {len(phrases)} phrase{_s(len(phrases))}",
         "scene": _scene(case),
         "picture": [width, height],
         "query": {
-            "phrases": list(case.compiled.texts),
+            "phrases": phrases,
             "negatives": list(case.compiled.negative_texts),
             "mode": case.compiled.mode,
             "threshold": case.compiled.threshold,
         },
         "path": _path(result),
         "default": described_default(case.scene),
-        "stages": {
-            "colour_ms": _rounded(stages.colour_ms),
-            "maps_ms": _rounded(stages.maps_ms),
-            "map_passes": stages.map_passes,
-            "layers_a_pixel": _rounded(stages.layers_a_pixel),
-            **_per_splat(case, result),
-        },
+        "stages": _stages(case, stages),
         "rows": [_row(mode, times, errors, base) for mode, times, errors in result.rows],
     }
 
@@ -113,37 +113,31 @@ def _path(result: Result) -> dict:
     }
 
 
-def _per_splat(case: Case, result: Result) -> dict:
-    """Nanoseconds for one splat at one pixel: of the colours, and of one pass of weight maps."""
-    stages = result.stages
+def _stages(case: Case, stages: Stages) -> dict:
+    """With nanoseconds for one splat at one pixel: of the colours, and of one pass of weight maps."""
     blended = stages.layers_a_pixel * case.size[0] * case.size[1]
     passes = max(1, stages.map_passes)
-    if not blended:
-        return {"colour_ns_a_splat": None, "maps_ns_a_splat": None}
     return {
-        "colour_ns_a_splat": _rounded(1e6 * stages.colour_ms / blended),
-        "maps_ns_a_splat": _rounded(1e6 * stages.maps_ms / blended / passes),
+        "colour_ms": _rounded(stages.colour_ms),
+        "maps_ms": _rounded(stages.maps_ms),
+        "map_passes": stages.map_passes,
+        "layers_a_pixel": _rounded(stages.layers_a_pixel),
+        "colour_ns_a_splat": _rounded(1e6 * stages.colour_ms / blended) if blended else None,
+        "maps_ns_a_splat": _rounded(1e6 * stages.maps_ms / blended / passes) if blended else None,
     }
 
 
 def _row(mode: Mode, times: Times, errors: Errors, base: list[float]) -> dict:
-    ratios = np.array(times.frames) / np.array(base)
+    measured = (times.cpu, times.gpu, times.answers, times.phrases)
     values = (
-        mode.name,
-        mode.axis,
         _rounded(np.median(times.frames)),
         _rounded(np.percentile(times.frames, 95)),
-        _rounded(np.median(ratios)),
-        _rounded(np.median(times.cpu)),
-        _rounded(np.median(times.gpu)) if times.gpu else None,
-        _rounded(np.median(times.answers)) if times.answers else None,
-        _rounded(np.median(times.phrases)) if times.phrases else None,
-        _rounded(errors.psnr),
-        _rounded(errors.relevance_mean),
-        _rounded(errors.relevance_max),
+        _rounded(np.median(np.array(times.frames) / np.array(base))),
+        *(_rounded(np.median(each)) if each else None for each in measured),
+        *map(_rounded, (errors.psnr, errors.relevance_mean, errors.relevance_max)),
         None if errors.mask_iou is None else round(errors.mask_iou, 5),
     )
-    return dict(zip(COLUMNS, values, strict=True))
+    return dict(zip(COLUMNS, (mode.name, mode.axis, *values), strict=True))
 
 
 def _case_lines(case: dict) -> list[str]:
@@ -162,8 +156,8 @@ def _case_lines(case: dict) -> list[str]:
         f"  of it, {stages['colour_ms']:g} ms sort and colours, {stages['maps_ms']:g} ms "
         f"{passes} pass{_s(passes, 'es')} of weight maps; {stages['layers_a_pixel']:.1f} splats a pixel",
     ]
-    rows = [_HEADINGS, *(_cells(row) for row in case["rows"])]
-    widths = [max(len(row[i]) for row in rows) for i in range(len(_HEADINGS))]
+    rows = [("mode", *(heading for heading, _ in _NUMBERS.values())), *map(_cells, case["rows"])]
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     for row in rows:
         cells = (c.rjust(w) if i else c.ljust(w) for i, (c, w) in enumerate(zip(row, widths, strict=True)))
         lines.append("  " + "  ".join(cells).rstrip())
@@ -171,28 +165,8 @@ def _case_lines(case: dict) -> list[str]:
 
 
 def _cells(row: dict) -> tuple[str, ...]:
-    def number(name: str, form: str) -> str:
-        return "-" if row[name] is None else format(row[name], form)
-
-    return (
-        row["mode"],
-        number("ms_median", ".1f"),
-        number("ms_p95", ".1f"),
-        number("times_default", ".3f"),
-        number("cpu_ms_median", ".1f"),
-        number("gpu_ms_median", ".1f"),
-        number("query_ms", ".2f"),
-        number("phrase_ms", ".2f"),
-        number("psnr_db", ".1f"),
-        number("relevance_mean", ".1e"),
-        number("relevance_max", ".1e"),
-        number("mask_iou", ".4f"),
-    )
-
-
-def _count(compiled: CompiledQuery) -> str:
-    count = len(compiled.texts)
-    return f"{count} phrase{_s(count)}"
+    values = ((row[name], form) for name, (_, form) in _NUMBERS.items())
+    return row["mode"], *("-" if value is None else format(value, form) for value, form in values)
 
 
 def _s(count: int, plural: str = "s") -> str:

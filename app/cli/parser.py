@@ -11,7 +11,7 @@ from langflash_core.errors import InputError
 
 from .overview import LAB, in_groups
 
-_JUDGING, _SCENES, _SHOWING = "words.judging", "words.scenes", "words.showing"
+_SCENES, _SHOWING = "words.scenes", "words.showing"
 COMMANDS = {
     "view": _SCENES,
     "reconstruct": _SCENES,
@@ -28,7 +28,7 @@ COMMANDS = {
     "level": _SCENES,
     "inventory": _SCENES,
     "info": _SCENES,
-    "bench": _JUDGING,
+    "bench": _SHOWING,
     "weights": _SCENES,
     "words": _SCENES,
     "desktop": _SHOWING,

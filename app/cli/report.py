@@ -64,6 +64,14 @@ def write_json(document: dict[str, Any], stream: TextIO) -> None:
     stream.flush()
 
 
+def tell(args: Namespace, document: dict[str, Any], lines: Iterable[str], out: TextIO) -> None:
+    """With --json the document, else the lines for people."""
+    if args.json:
+        return write_json(document, out)
+    for line in lines:
+        print(line, file=out)
+
+
 class ProgressBar:
     """A bar on stderr where stderr is a terminal, silence otherwise.
 

@@ -9,15 +9,11 @@ from typing import TextIO
 from langflash_core.base.files import check_folder, staged_folder
 from langflash_core.errors import InputError, LangFlashError, PromptError
 
-from .report import ProgressBar, say_warnings, write_json
+from .report import ProgressBar, say_warnings, tell
 
 
 def run_survey(args: Namespace, phrases: Sequence[str], negatives: Sequence[str] | None, out: TextIO) -> None:
-    """Ask scene after scene; those that cannot be asked are left out and named.
-
-    Raises:
-        LangFlashError: there is no scene, none can be asked, a phrase or the folder cannot be used.
-    """
+    """Ask scene after scene; those that cannot be asked are left out and named."""
     if args.view is not None or args.camera or args.size or args.ortho or args.npz:
         raise InputError("--scenes chooses the views; leave out --view, --camera, --size, --ortho and --npz")
     if args.output is None:
@@ -31,8 +27,7 @@ def run_survey(args: Namespace, phrases: Sequence[str], negatives: Sequence[str]
     from langflash_core.writing.survey import Reply, ask_scene, write_survey
 
     from .renderers import open_renderer
-    from .scenes import open_scene
-    from .vocabulary import taught_by
+    from .scenes import open_scene, taught_by
 
     teach = taught_by(args.vocabulary)
     colours = HeatColours(args.colormap, args.span)
@@ -62,14 +57,13 @@ def run_survey(args: Namespace, phrases: Sequence[str], negatives: Sequence[str]
         document = write_survey(replies, left_out, staging)
     say_warnings(f"{name} was left out: {why}" for name, why in left_out)
     say_warnings(dict.fromkeys(one.answer.note for one in replies if one.answer.note))
-    if args.json:
-        write_json({"folder": str(args.output), **document}, out)
-        return
+    lines = []
     for row in document["prompts"]:
         found = [one for one in row["scenes"] if one["found"]]
         surest = ", ".join(f"{one['scene']} {one['score']:.2f}" for one in found[:3]) or "-"
-        print(f"{row['prompt']}: found in {len(found)} of {len(row['scenes'])} scenes: {surest}", file=out)
-    print(f"-> {args.output / 'index.html'}", file=out)
+        lines.append(f"{row['prompt']}: found in {len(found)} of {len(row['scenes'])} scenes: {surest}")
+    lines.append(f"-> {args.output / 'index.html'}")
+    tell(args, {"folder": str(args.output), **document}, lines, out)
 
 
 def scene_files(folder: Path) -> list[Path]:

@@ -3,10 +3,59 @@
 import math
 import re
 from argparse import ArgumentTypeError
+from collections.abc import Callable
 
 from langflash_core.base.detail import FEWEST, MOST
 from langflash_core.base.formats import LARGEST_SIDE
 from langflash_core.base.pictures import SPOKEN, WORDS, Picture
+
+
+def _number(text: str) -> float:
+    try:
+        value = float(text)
+    except ValueError:
+        raise ArgumentTypeError(f"expected a number, received {text!r}") from None
+    if not math.isfinite(value):
+        raise ArgumentTypeError(f"expected a finite number, received {text}")
+    return value
+
+
+def _whole(text: str, smallest: int, largest: int) -> int:
+    if not re.fullmatch(r"[+-]?\d+", text) or not smallest <= int(text) <= largest:
+        raise ArgumentTypeError(f"expected a whole number from {smallest} to {largest}, received {text!r}")
+    return int(text)
+
+
+def _number_of(said: str, fits: Callable[[float], bool]) -> Callable[[str], float]:
+    """Reads a number that fits; said: what is expected."""
+
+    def read(text: str) -> float:
+        value = _number(text)
+        if not fits(value):
+            raise ArgumentTypeError(f"expected {said}, received {text}")
+        return value
+
+    return read
+
+
+def _whole_from(smallest: int, largest: int) -> Callable[[str], int]:
+    return lambda text: _whole(text, smallest, largest)
+
+
+above_zero = _number_of("a number above 0", lambda value: value > 0)
+share = _number_of("a number from 0 to 1", lambda value: 0 <= value <= 1)
+kept_fraction = _number_of("a number between 0 and 1", lambda value: 0 < value < 1)  # a threshold
+open_fov = _number_of("degrees between 1 and 179", lambda value: 1 < value < 179)
+minutes = _number_of("minutes above 0", lambda value: value > 0)
+film_seconds = _number_of("seconds above 0, at most 600", lambda value: 0 < value <= 600)
+film_time = _number_of("seconds, not below 0", lambda value: value >= 0)
+
+whole_count = _whole_from(1, 10**9)
+frame_count = _whole_from(2, 10_000)
+gaussian_count = _whole_from(FEWEST, MOST)
+atom_count = _whole_from(1, 960)  # as many as a query's shader holds
+pixel_side = _whole_from(56, 1024)  # of the square that has as many pixels as the network is to see
+seed = _whole_from(0, 2**31 - 1)  # of a room, or of a run
 
 
 def size(text: str) -> tuple[int, int]:
@@ -20,11 +69,6 @@ def size(text: str) -> tuple[int, int]:
     return width, height
 
 
-def pixel_side(text: str) -> int:
-    """Side of the square that has as many pixels as the network is to see, 56 to 1024."""
-    return _whole(text, 56, 1024)
-
-
 def point(text: str) -> tuple[float, float, float]:
     """`X,Y,Z` in scene units."""
     parts = text.split(",")
@@ -34,39 +78,20 @@ def point(text: str) -> tuple[float, float, float]:
     return x, y, z
 
 
+def spot(text: str) -> tuple[float, float, float]:
+    """`X,Y,Z`: a point or a direction."""
+    words = text.split(",")
+    if len(words) != 3:
+        raise ArgumentTypeError(f"expected three numbers X,Y,Z, received {text!r}")
+    x, y, z = (_number(word) for word in words)
+    return x, y, z
+
+
 def photo_index(text: str) -> int:
     """Index of a photo, from 0; people count from 1."""
     if text.strip() == "0":
         raise ArgumentTypeError("photos count from 1; 1 is the first photo")
     return _whole(text, 1, 10**6) - 1
-
-
-def seed(text: str) -> int:
-    """Number of a room, or of a run."""
-    return _whole(text, 0, 2**31 - 1)
-
-
-def whole_count(text: str) -> int:
-    """How many, at least 1."""
-    return _whole(text, 1, 10**9)
-
-
-def gaussian_count(text: str) -> int:
-    """How many Gaussians a scene is to have."""
-    return _whole(text, FEWEST, MOST)
-
-
-def atom_count(text: str) -> int:
-    """How many atoms, 1 to 960: as many as a query's shader holds."""
-    return _whole(text, 1, 960)
-
-
-def above_zero(text: str) -> float:
-    """A factor above 0."""
-    value = _number(text)
-    if value <= 0:
-        raise ArgumentTypeError(f"expected a number above 0, received {text}")
-    return value
 
 
 def part(text: str) -> tuple[int, int]:
@@ -78,59 +103,6 @@ def part(text: str) -> tuple[int, int]:
     return _whole(index, 0, parts - 1), parts
 
 
-def minutes(text: str) -> float:
-    """A time above 0."""
-    value = _number(text)
-    if value <= 0:
-        raise ArgumentTypeError(f"expected minutes above 0, received {text}")
-    return value
-
-
-def film_seconds(text: str) -> float:
-    """Length of a video, up to ten minutes."""
-    value = _number(text)
-    if not 0 < value <= 600:
-        raise ArgumentTypeError(f"expected seconds above 0, at most 600, received {text}")
-    return value
-
-
-def film_time(text: str) -> float:
-    """Seconds from the begin of a film."""
-    value = _number(text)
-    if value < 0:
-        raise ArgumentTypeError(f"expected seconds, not below 0, received {text}")
-    return value
-
-
-def frame_count(text: str) -> int:
-    """How many frames of a film, at least 2."""
-    return _whole(text, 2, 10_000)
-
-
-def open_fov(text: str) -> float:
-    """Degrees, between 1 and 179."""
-    value = _number(text)
-    if not 1.0 < value < 179.0:
-        raise ArgumentTypeError(f"expected degrees between 1 and 179, received {text}")
-    return value
-
-
-def share(text: str) -> float:
-    """A number from 0 to 1."""
-    value = _number(text)
-    if not 0.0 <= value <= 1.0:
-        raise ArgumentTypeError(f"expected a number from 0 to 1, received {text}")
-    return value
-
-
-def kept_fraction(text: str) -> float:
-    """A relevancy threshold, strictly between 0 and 1."""
-    value = _number(text)
-    if not 0.0 < value < 1.0:
-        raise ArgumentTypeError(f"expected a number between 0 and 1, received {text}")
-    return value
-
-
 def intrinsics(text: str) -> tuple[float, float, float, float]:
     """`FX,FY,CX,CY` in pixels; focal lengths above 0."""
     words = text.split(",")
@@ -140,15 +112,6 @@ def intrinsics(text: str) -> tuple[float, float, float, float]:
     if fx <= 0 or fy <= 0:
         raise ArgumentTypeError(f"expected focal lengths above 0, received {text}")
     return fx, fy, cx, cy
-
-
-def spot(text: str) -> tuple[float, float, float]:
-    """`X,Y,Z`: a point or a direction."""
-    words = text.split(",")
-    if len(words) != 3:
-        raise ArgumentTypeError(f"expected three numbers X,Y,Z, received {text!r}")
-    x, y, z = (_number(word) for word in words)
-    return x, y, z
 
 
 def crop(text: str) -> tuple[int, int, int, int]:
@@ -191,19 +154,3 @@ def what(text: str) -> tuple[Picture, str, int | None]:
         known = f"{', '.join(WORDS[:-1])} or {WORDS[-1]}"
         raise ArgumentTypeError(f"expected {known}, received {text!r}")
     return picture, word, _whole(atom, 0, 10**6) if colon else None
-
-
-def _number(text: str) -> float:
-    try:
-        value = float(text)
-    except ValueError:
-        raise ArgumentTypeError(f"expected a number, received {text!r}") from None
-    if not math.isfinite(value):
-        raise ArgumentTypeError(f"expected a finite number, received {text}")
-    return value
-
-
-def _whole(text: str, smallest: int, largest: int) -> int:
-    if not re.fullmatch(r"[+-]?\d+", text) or not smallest <= int(text) <= largest:
-        raise ArgumentTypeError(f"expected a whole number from {smallest} to {largest}, received {text!r}")
-    return int(text)

@@ -5,7 +5,6 @@ Whoever answers is a class or function of the form `MakeAnswers`: shaders here, 
 
 from collections.abc import Callable, Hashable
 
-import moderngl
 import numpy as np
 
 from langflash_core.language.relevance import CompiledQuery
@@ -19,9 +18,8 @@ from .weights import Maps
 
 
 class Answers:
-    """Owns the relevance of one picture size: 4 phrases a layer, float32. Subclasses fill it by `answer`.
-
-    Steps whose inputs are the same as the last time are passed over: `stale` tells.
+    """Owns the relevance of one picture size: 4 phrases a layer, float32. Subclasses have the three steps: of
+    a dictionary, of a set of negatives, of prompts. Those whose inputs are as the last time are passed over.
     """
 
     def __init__(self, painter: Painter, size: tuple[int, int], packed: PackedMaps):
@@ -35,22 +33,45 @@ class Answers:
         """Relevance of `compiled` over `maps`; 0 where no atom is in view."""
         relevance = self._relevance.exactly(num_groups(len(compiled.prompts)))
         if len(maps.atoms):
-            self.answer(compiled, maps, relevance)
+            self._answer(compiled, maps, relevance)
             return relevance
         for group in range(relevance.num_layers):
             relevance.layers(group, 1).clear()
         self.forget()
         return relevance
 
-    def answer(self, compiled: CompiledQuery, maps: Maps, into: LayerTarget) -> None:
+    def _answer(self, compiled: CompiledQuery, maps: Maps, into: LayerTarget) -> None:
         """Fill `into` over maps of at least one atom."""
-        raise NotImplementedError
+        factor, prompts, negatives = in_numbers(compiled, maps.atoms)
+        temperature = temperature_of(compiled)
+        against = (maps.version, factor.tobytes(), negatives.tobytes())
+        if self._stale("norm", *against[:2]):
+            self.measure(maps, factor)
+        if self._stale("negatives", *against):
+            self.scale(maps, factor @ negatives.T)
+        if self._stale("query", *against, into, temperature, prompts.tobytes()):
+            self.compare(maps, factor @ prompts.T, temperature, into)
 
-    def stale(self, step: str, *inputs: Hashable) -> bool:
-        """Whether a step's inputs differ from the last time; they are taken as its new ones."""
+    def _stale(self, step: str, *inputs: Hashable) -> bool:
+        """Whether a step's inputs differ from the last time; it is taken and counted then."""
         changed = self._keys.get(step) != inputs
         self._keys[step] = inputs
+        if changed:
+            self.painter.passes[step] += 1
         return changed
+
+    def measure(self, maps: Maps, factor: np.ndarray) -> None:
+        """|w R| for a factor R (Ka, r)."""
+        raise NotImplementedError
+
+    def scale(self, maps: Maps, dots: np.ndarray) -> None:
+        """1 / |w R| and the largest of the negatives' cosines, by products (Ka, M) with the atoms; of none
+        where M = 0."""
+        raise NotImplementedError
+
+    def compare(self, maps: Maps, dots: np.ndarray, temperature: float, into: LayerTarget) -> None:
+        """Relevance of prompts by their products (Ka, P) with the atoms."""
+        raise NotImplementedError
 
     def forget(self) -> None:
         """Nothing counts as computed."""
@@ -64,14 +85,6 @@ class Answers:
 MakeAnswers = Callable[[Painter, tuple[int, int], PackedMaps], Answers]
 
 
-def _add_squares(packed: PackedMaps, maps: Maps, factor: np.ndarray, into: moderngl.Framebuffer) -> None:
-    """|w R|^2 and the peak, added to `into`. R = L Q with triangular L: column j needs no atom before j."""
-    triangular = np.asarray(np.linalg.qr(factor.T, mode="r")).T  # (Ka, min(Ka, r))
-    for start, first, block in blocks(triangular):
-        first_pass = {"with_peak": float(start == 0)}
-        packed.combine(into, "norm.frag", maps, block, first, uniforms=first_pass, blend=ADDED)
-
-
 class ShaderAnswers(Answers):
     """In shaders, from packed maps: the packing is of a view, |F|^2 of a dictionary, its inverse root and the
     best negative's cosine of a set of negatives, relevance of the prompts. Only what changed is drawn."""
@@ -83,21 +96,22 @@ class ShaderAnswers(Answers):
         self._squares_target = painter.ctx.framebuffer([self._squares])
         self._scales_target = painter.ctx.framebuffer([self._scales])
 
-    def answer(self, compiled: CompiledQuery, maps: Maps, into: LayerTarget) -> None:
-        factor, prompts, negatives = in_numbers(compiled, maps.atoms)
-        temperature = temperature_of(compiled)
-        dictionary = (maps.version, factor.tobytes())
-        if self.stale("norm", dictionary):
-            self._squares_target.clear()
-            _add_squares(self.packed, maps, factor, self._squares_target)
-            self.painter.passes["norm"] += 1
-        if self.stale("scales", dictionary, negatives.tobytes()):
-            self._scale(maps, factor @ negatives.T)
-        if self.stale("prompts", dictionary, negatives.tobytes(), into, temperature, prompts.tobytes()):
-            self._compare(maps, factor @ prompts.T, temperature, into)
+    def measure(self, maps: Maps, factor: np.ndarray) -> None:
+        """|w R|^2, and the peak. R = L Q with triangular L: column j needs no atom before j."""
+        self._squares_target.clear()
+        triangular = np.asarray(np.linalg.qr(factor.T, mode="r")).T  # (Ka, min(Ka, r))
+        for start, first, block in blocks(triangular):
+            self.packed.combine(
+                self._squares_target,
+                "norm.frag",
+                maps,
+                block,
+                first,
+                uniforms={"with_peak": float(start == 0)},
+                blend=ADDED,
+            )
 
-    def _scale(self, maps: Maps, dots: np.ndarray) -> None:
-        """1 / |w R| and the largest of the negatives' cosines (Ka, M); of none where M = 0."""
+    def scale(self, maps: Maps, dots: np.ndarray) -> None:
         self._scales_target.clear(0.0, -1.0)
         for group in range(num_groups(dots.shape[1])):
             block = dots[:, PHRASES_A_LAYER * group :][:, :PHRASES_A_LAYER]
@@ -113,10 +127,8 @@ class ShaderAnswers(Answers):
                 blend=ADDED,
                 equation=MAXIMUM,
             )
-        self.painter.passes["negatives"] += 1
 
-    def _compare(self, maps: Maps, dots: np.ndarray, temperature: float, into: LayerTarget) -> None:
-        """Relevance of prompts by their products (Ka, P) with the atoms."""
+    def compare(self, maps: Maps, dots: np.ndarray, temperature: float, into: LayerTarget) -> None:
         for group in range(into.num_layers):
             self.packed.combine(
                 into.layers(group, 1),
@@ -126,7 +138,6 @@ class ShaderAnswers(Answers):
                 textures={"scales": self._scales},
                 uniforms={"temperature": temperature},
             )
-        self.painter.passes["query"] += 1
 
     def release(self) -> None:
         super().release()
@@ -134,7 +145,9 @@ class ShaderAnswers(Answers):
             owned.release()
 
 
-def in_numbers(compiled: CompiledQuery, atoms: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+def in_numbers(
+    compiled: CompiledQuery, atoms: np.ndarray | slice = slice(None)
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Factor (Ka, r) of the atoms, prompts (P, r) and negatives (M, r) in float64."""
     tensors = (compiled.factor, compiled.prompts, compiled.negatives)
     factor, prompts, negatives = (values.detach().cpu().double().numpy() for values in tensors)

@@ -10,9 +10,8 @@ from langflash_core.geometry.nearness import NEAREST
 from langflash_core.splat.compose import CLOSES, DEPTH
 from langflash_core.splat.projection import ALPHA_MIN
 
-from .colour import draw_colour
+from .layered import Prepared
 from .layout import ATOMS_A_LAYER
-from .level import Prepared
 from .painter import Painter
 from .targets import ADDED, ColourTarget, Layers, LayerTarget
 
@@ -48,7 +47,7 @@ class Blend:
         assert level.weights is not None
         for place, part in enumerate(level.parts):
             carried = numbers[place] if into is not None else None
-            draw_colour(self._painter.programs, part.splats, self._drawn_into(place, carried), carried)
+            part.splats.splat(self._drawn_into(place, carried), carried)
         self._painter.passes["colour"] += len(level.parts)
         few = len(level.parts) <= _FEW
         textures: dict[str, moderngl.Texture] = {}
@@ -116,7 +115,7 @@ def add_maps(
     """Add `count` layers of one part's maps, from `first` on, times what it counts, to as many others.
 
     Args:
-        halved: as `Prepared` has it, of the level.
+        halved: as `LayeredLevel` has it.
     """
     textures = {"maps": own.array, "shares": shares}
     uniforms = {"part": part, "first_layer": first, "halved": halved and part > 0}

@@ -13,9 +13,10 @@ from langflash_core.scene.trust import COSINES
 from langflash_core.types import Camera, Scene
 
 from .gaps import Gaps
+from .ordering import lens
 from .packed import PackedMaps
 from .painter import Painter, Textures, Uniforms
-from .photos import MOST_PHOTOS, SAME, WORST, PhotoDepths, lens, photo_places
+from .photos import MOST_PHOTOS, SAME, WORST, PhotoDepths, photo_places
 from .targets import ColourTarget, LayerTarget
 from .weights import Maps
 

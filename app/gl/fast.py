@@ -9,13 +9,12 @@ the same where the Gaussians of a pixel agree; where they do not, edges are a li
 that is on a scene, `langflash bench` says.
 """
 
-import moderngl
 import numpy as np
 
 from langflash_core.language.relevance import CompiledQuery
 from langflash_core.language.settings import RELEVANCE
 
-from .answers import temperature_of
+from .answers import in_numbers, temperature_of
 from .layout import ATOMS_A_LAYER, LAYERS_A_PASS, PHRASES_A_LAYER, num_groups, num_layers
 from .painter import Painter
 from .splats import SplatBuffers
@@ -31,9 +30,7 @@ def splat_numbers(splats: SplatBuffers, compiled: CompiledQuery, norms: np.ndarr
     Args:
         norms: |f_i| (N,).
     """
-    factor = compiled.factor.detach().cpu().double().numpy()
-    prompts = compiled.prompts.detach().cpu().double().numpy()
-    negatives = compiled.negatives.detach().cpu().double().numpy()
+    factor, prompts, negatives = in_numbers(compiled)
     dots = splats.carried.mixed(factor @ np.concatenate((prompts, negatives)).T)  # (N, P + M)
     answers = dots[:, : len(prompts)]
     if compiled.mode == "relevancy":
@@ -56,12 +53,10 @@ class FastPasses:
         self.num_phrases = num_phrases
         self.num_layers = num_layers(1 + num_phrases)
         self.relevance = LayerTarget(painter.ctx, size, num_groups(num_phrases), "f4")
+        self.numbers = LayerTarget(painter.ctx, size, self.num_layers, dtype)
+        self.framebuffer = self.numbers.layers(0, self.num_layers, beside=(target.colour, target.depth))
         self.shows: tuple[int, int] = (0, 0)  # places and question
         self._painter = painter
-        self.numbers = LayerTarget(painter.ctx, size, self.num_layers, dtype)
-        self.framebuffer: moderngl.Framebuffer = self.numbers.layers(
-            0, self.num_layers, beside=(target.colour, target.depth)
-        )
 
     def run(self, compiled: CompiledQuery) -> None:
         """Make `relevance` (4 phrases a layer, float32) of what was splatted last."""

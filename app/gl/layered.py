@@ -22,8 +22,9 @@ at a loss of .3 to .9 dB; without it pictures jump where another layer becomes t
 class LayeredLevel:
     """Owns the layers of a share of a scene's Gaussians; made as they come into view.
 
-    parts: as prepared, the nearest first. weights: (L,) by which they are blended; None of one layer alone.
-    halved: whether they are those of a picture that is to be quick, as `Prepared` has it.
+    parts: as prepared, the nearest first, each splatted into a picture of its own and blended by `weights`
+    (langflash_core/splat/compose.py): (L,), in sum 1; None of one layer alone. halved: whether all parts but
+    the first are projected for half the picture's sides. Keys as of `Level`.
     """
 
     def __init__(
@@ -150,6 +151,10 @@ class LayeredLevel:
             layer.release()
         self._layers.clear()
         self.parts = ()
+
+
+Prepared = Level | LayeredLevel
+"""What a view draws."""
 
 
 def _cameras(camera: Camera, num_parts: int, quick: bool) -> list[Camera]:

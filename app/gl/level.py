@@ -1,8 +1,6 @@
-"""A share of a scene's Gaussians, ordered and projected, and what a view asks of one that it draws."""
+"""A share of a scene's Gaussians, ordered and projected."""
 
-from collections.abc import Sequence
 from itertools import count
-from typing import Protocol
 
 import numpy as np
 import torch
@@ -17,38 +15,13 @@ from .splats import SplatBuffers
 _names = count(1)  # each given once, so that no two contents are ever taken for each other
 
 
-class Prepared(Protocol):
-    """What a view draws: one part, or several, each splatted into a picture of its own and blended by
-    `weights` (langflash_core/splat/compose.py).
-
-    `order_key` names the Gaussians and their order, `places_key` also their footprints and colours:
-    what was drawn from another order or other places shows another key.
-    """
-
-    @property
-    def parts(self) -> "Sequence[Level]": ...
-
-    @property
-    def weights(self) -> np.ndarray | None:
-        """(L,), of so many parts, in sum 1; None of one part alone."""
-        ...
-
-    @property
-    def halved(self) -> bool:
-        """Whether all parts but the first are projected for half the picture's sides."""
-        ...
-
-    @property
-    def order_key(self) -> int: ...
-
-    @property
-    def places_key(self) -> int: ...
-
-
 class Level:
     """A share of a scene's Gaussians, ordered and projected for one camera at a time; its only part.
 
-    exact: whether the order is that camera's, and not one that follows it."""
+    `order_key` names the Gaussians and their order, `places_key` also their footprints and colours: what was
+    drawn from another order or other places shows another key. exact: whether the order is that camera's, and
+    not one that follows it. weights, halved: as of `LayeredLevel`.
+    """
 
     weights: np.ndarray | None = None
     halved = False

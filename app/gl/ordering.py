@@ -204,7 +204,7 @@ def sees(before: Camera, now: Camera, depths: tuple[float, float], margin: float
     around that. Frusta are convex: their corners tell."""
     if before.orthographic != now.orthographic:
         return False
-    (old, old_lens), (new, lens) = _matrices(before), _matrices(now)
+    (old, old_lens), (new, lens) = matrices(before), matrices(now)
     x, y = np.meshgrid((0.0, float(now.width)), (0.0, float(now.height)))
     pixels = np.stack((x.ravel(), y.ravel(), np.ones(4)), 1)  # (4, 3)
     rays = (pixels @ np.linalg.inv(lens).T)[None].repeat(2, 0)  # (2, 4, 3), of z = 1
@@ -236,7 +236,7 @@ def _around(places: Places, camera: Camera, margin: float) -> tuple[np.ndarray, 
 
 def _chosen(places: Places, camera: Camera) -> tuple[np.ndarray, np.ndarray]:
     """Rows (n,) uint32, ascending, that may touch the image, and their depths (n,) float64."""
-    viewmat, _ = _matrices(camera)
+    viewmat, _ = matrices(camera)
     row = viewmat[2]
     rows, depths = [np.zeros(0, np.uint32)], [np.zeros(0)]
     for first in range(0, len(places.widest), AT_ONCE):
@@ -253,7 +253,7 @@ def _chosen(places: Places, camera: Camera) -> tuple[np.ndarray, np.ndarray]:
 
 def _may_touch(means: np.ndarray, widest: np.ndarray, z: np.ndarray, camera: Camera) -> np.ndarray:
     """(n,) bool, conservative: the Frobenius norm of the Jacobian bounds the footprint."""
-    viewmat, K = _matrices(camera)
+    viewmat, K = matrices(camera)
     seen = z >= NEAR
     flat = camera.orthographic
     inverse = np.ones(len(z), np.float32) if flat else 1 / np.where(seen, z, 1.0).astype(np.float32)
@@ -269,14 +269,20 @@ def _may_touch(means: np.ndarray, widest: np.ndarray, z: np.ndarray, camera: Cam
     return seen
 
 
-def _matrices(camera: Camera) -> tuple[np.ndarray, np.ndarray]:
+def matrices(camera: Camera) -> tuple[np.ndarray, np.ndarray]:
     """World to camera (4, 4) and lens (3, 3), float64."""
     return camera.viewmat.detach().cpu().double().numpy(), camera.K.detach().cpu().double().numpy()
 
 
+def lens(camera: Camera) -> dict[str, np.ndarray | int]:
+    """The uniforms that shaders project by: `pinhole` (4,) fx fy cx cy, pixels, and `orthographic`."""
+    _, K = matrices(camera)
+    return {"pinhole": K[[0, 1, 0, 1], [0, 1, 2, 2]], "orthographic": int(camera.orthographic)}
+
+
 def camera_key(camera: Camera) -> tuple:
     """Names all that pictures depend on."""
-    pose, lens = (matrix.tobytes() for matrix in _matrices(camera))
+    pose, lens = (matrix.tobytes() for matrix in matrices(camera))
     light = None if camera.light is None else camera.light.cpu().numpy().tobytes()
     return pose, lens, camera.width, camera.height, camera.orthographic, light
 

@@ -2,16 +2,15 @@
 
 import moderngl
 import numpy as np
-from torch import Tensor
 
 from langflash_core.language.settings import ANSWERING
 from langflash_core.surface.settings import CONSISTENCY
 from langflash_core.types import Camera, Scene
 
-from .colour import draw_colour
+from .ordering import lens, matrices
 from .painter import Painter
 from .splats import SplatBuffers
-from .targets import ColourTarget
+from .targets import ColourTarget, mean_depths, read
 
 SAME = 0.05
 """Relative depth within which a photo shows the very surface: a pixel of 1/200 of the focal length on a floor
@@ -53,18 +52,14 @@ class PhotoDepths:
 
     def uniforms(self, camera: Camera) -> dict[str, np.ndarray | int]:
         """Values of photos.glsl for a picture drawn by `camera`."""
-        back = np.linalg.inv(_numbers(camera.viewmat))
+        back = np.linalg.inv(matrices(camera)[0])
         pinholes = np.zeros((self.capacity, 4))
-        matrices = np.tile(np.eye(4), (self.capacity, 1, 1))
+        to_photos = np.tile(np.eye(4), (self.capacity, 1, 1))
         for photo, seen in enumerate(self.cameras):
-            pinholes[photo] = _pinhole(seen)
-            matrices[photo] = _numbers(seen.viewmat) @ back
-        return {
-            "num_photos": len(self.cameras),
-            **lens(camera),
-            "pinholes": pinholes,
-            "to_photos": matrices,
-        }
+            pinholes[photo] = lens(seen)["pinhole"]
+            to_photos[photo] = matrices(seen)[0] @ back
+        photos = {"num_photos": len(self.cameras), "pinholes": pinholes, "to_photos": to_photos}
+        return {**photos, **lens(camera)}
 
     def release(self) -> None:
         self.texture.release()
@@ -79,7 +74,8 @@ def spread(count: int) -> list[int]:
 
 def photo_places(scene: Scene, camera: Camera) -> np.ndarray:
     """(n, 4) float32: where the nearest `MOST_PHOTOS` stand, x y z 1 in the axes of a picture's camera."""
-    places = np.linalg.inv(_numbers(scene.viewmats))[:, :, 3] @ _numbers(camera.viewmat).T
+    poses = scene.viewmats.detach().cpu().double().numpy()
+    places = np.linalg.inv(poses)[:, :, 3] @ matrices(camera)[0].T
     nearest = np.argsort(np.linalg.norm(places[:, :3], axis=1), kind="stable")[:MOST_PHOTOS]
     return places[nearest].astype(np.float32)
 
@@ -87,20 +83,6 @@ def photo_places(scene: Scene, camera: Camera) -> np.ndarray:
 def _small(camera: Camera) -> Camera:
     ratio = min(1.0, LONGEST_SIDE / max(camera.width, camera.height))
     return camera.with_size(max(1, round(camera.width * ratio)), max(1, round(camera.height * ratio)))
-
-
-def lens(camera: Camera) -> dict[str, np.ndarray | int]:
-    """A picture's camera, as shaders take it that ask where a pixel's surface is."""
-    return {"pinhole": _pinhole(camera), "orthographic": int(camera.orthographic)}
-
-
-def _pinhole(camera: Camera) -> np.ndarray:
-    K = _numbers(camera.K)
-    return np.array([K[0, 0], K[1, 1], K[0, 2], K[1, 2]])
-
-
-def _numbers(values: Tensor) -> np.ndarray:
-    return values.detach().cpu().double().numpy()
 
 
 def _own_scene(scene: Scene, view: int) -> Scene:
@@ -123,10 +105,7 @@ def _depths(painter: Painter, splats: SplatBuffers, camera: Camera) -> np.ndarra
         splats.sort(camera)
     if len(splats.order):
         splats.project(camera)
-    draw_colour(painter.programs, splats, target.framebuffer)
-    sums = np.frombuffer(target.depth.read(), np.float32).reshape(camera.height, camera.width, 2)
+    splats.splat(target.framebuffer)
+    sums = read(target.depth).reshape(camera.height, camera.width, 2)
     target.release()
-    alphas = sums[..., 1]
-    return np.where(
-        alphas >= ANSWERING.covered_alpha, sums[..., 0] / np.maximum(alphas, ANSWERING.covered_alpha), 0
-    ).astype("f4")
+    return mean_depths(sums, ANSWERING.covered_alpha)

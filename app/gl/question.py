@@ -7,7 +7,7 @@ import numpy as np
 from langflash_core.geometry.nearness import NEAREST
 from langflash_core.language.relevance import CompiledQuery
 
-from .answers import MakeAnswers
+from .answers import MakeAnswers, in_numbers
 from .fast import MAX_PHRASES, splat_numbers
 from .level import Level
 
@@ -37,7 +37,7 @@ class Question:
         levels, as many as a picture has layers."""
         numbers = self._numbers.pop(level, None)
         if numbers is None:
-            factor = self.compiled.factor.detach().cpu().double().numpy()
+            factor, *_ = in_numbers(self.compiled)
             numbers = splat_numbers(level.splats, self.compiled, level.norms(factor))
         self._numbers[level] = numbers
         while len(self._numbers) > NEAREST:

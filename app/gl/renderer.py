@@ -30,12 +30,10 @@ from .canvas import Canvas, Precision
 from .colours import hues
 from .display import Answer, Background, Drawn
 from .hardware import Hardware
-from .layered import LayeredLevel
+from .layered import Prepared
 from .layout import PHRASES_A_LAYER
-from .level import Level
-from .picture import DrawnPicture, Picture
+from .picture import DrawnPicture, Picture, StillPicture
 from .processor.still import Still
-from .processor.still_picture import StillPicture
 from .question import Question
 from .scene import LiveScene, MakeSplats, Thinned
 from .splats import SplatBuffers
@@ -59,6 +57,7 @@ class SplatRenderer:
     Row 0 of every texture is the top of the image: show them with the usual (0, 0)-(1, 1)
     texture coordinates of a window library, or read them without flipping.
 
+    `canvas`: what it draws with and on. `splats`: makes the buffers of a scene.
     `passes` counts what was drawn: "colour", "weights" (24 atoms each) touch splats, those of every layer on
     its own; "blend", "norm", "negatives", "query", "show" do not. `exact`: whether what was drawn last is in
     its own camera's order.
@@ -75,11 +74,9 @@ class SplatRenderer:
     ):
         """
         Args:
-            precision: of colour and weight maps; alphas, depth and relevance are always float32.
             splats: makes the buffers of a scene.
-            canvas: of this context and precision, to share with other renderers; None: one of its own.
-            maps: precision of weight maps, if another, of a canvas of its own. hardware: whose ways of
-                drawing such a canvas takes; None: where the context draws.
+            canvas: of this context and precision, to share with other renderers; None: one of its own, of
+                `precision`, `maps` and `hardware` (canvas.py).
 
         Raises:
             GraphicsError: the context is older than OpenGL 3.3.
@@ -89,11 +86,11 @@ class SplatRenderer:
             raise ValueError(f"canvas: expected {precision}, received {canvas.precision}")
         self._ctx = ctx
         self._own_canvas = canvas is None
-        self._canvas = Canvas(ctx, precision, maps, hardware) if canvas is None else canvas
-        self.passes = self._canvas.painter.passes
+        self.canvas = Canvas(ctx, precision, maps, hardware) if canvas is None else canvas
+        self.splats = splats
+        self.passes = self.canvas.painter.passes
         self.exact = True
         self._fill = False
-        self._splats = splats
         self._scene: LiveScene | None = None
         self._question: Question | None = None
         self._picture: Picture | None = None
@@ -107,7 +104,7 @@ class SplatRenderer:
         if self._scene is not None and self._scene.scene is scene:
             return
         self._release_scene()
-        self._scene = LiveScene(self._canvas.painter, scene, self._splats, share, thinned)
+        self._scene = LiveScene(self.canvas.painter, scene, self.splats, share, thinned)
         asked, self._question = self._question, None
         if asked is not None and asked.compiled.factor.shape[0] == scene.semantics.num_atoms:
             self._question = Question(asked.compiled, asked.answers)
@@ -145,25 +142,12 @@ class SplatRenderer:
         Raises:
             ValueError: there is no scene.
         """
-        if self._scene is None:
-            raise ValueError("change: expected set_scene before, received no scene")
-        self._scene.change(changes)
-
-    @property
-    def canvas(self) -> Canvas:
-        """What it draws with and on."""
-        return self._canvas
-
-    @property
-    def splats(self) -> MakeSplats:
-        """What makes the buffers of a scene."""
-        return self._splats
+        self._live("change").change(changes)
 
     def columns(self, features: bool) -> np.ndarray:
         """Of the atoms: colours (K, 3), or those of the features picture (K, 4)."""
-        if self._scene is None:
-            raise ValueError("columns: expected set_scene before, received no scene")
-        return self._scene.feature_columns if features else self._scene.atom_colours
+        scene = self._live("columns")
+        return scene.feature_columns if features else scene.atom_colours
 
     def draw(
         self,
@@ -238,14 +222,13 @@ class SplatRenderer:
             ValueError: there is no scene.
             GraphicsError: the image is larger than the driver's textures.
         """
-        if self._scene is None:
-            raise ValueError("bring: expected set_scene before, received no scene")
-        view = self._canvas.view((still.camera.width, still.camera.height))
+        scene = self._live("bring")
+        view = self.canvas.view((still.camera.width, still.camera.height))
         view.take(still.key, still.colour, still.depth)
         view.forget_maps()  # it has its own
         drawn = Drawn(view.colour, still.camera, background, still.key, self._fill)
-        self._picture = StillPicture(self._scene, view, drawn, still)
-        self._scene.forget_past()
+        self._picture = StillPicture(scene, view, drawn, still)
+        scene.forget_past()
 
     def fill(self, gaps: bool) -> None:
         """Whether pictures of colours show what is around their gaps (scene/gaps.py), from now on and in the
@@ -266,7 +249,7 @@ class SplatRenderer:
         received = compiled.factor.shape[0]
         if self._scene is not None and received != self._scene.num_atoms:
             raise ValueError(f"compiled: expected {self._scene.num_atoms} atoms, received {received}")
-        self._question = Question(compiled, self._canvas.hardware.answers)
+        self._question = Question(compiled, self.canvas.hardware.answers)
 
     # --- for who measures -------------------------------------------------------------------
 
@@ -358,7 +341,7 @@ class SplatRenderer:
     def picture(self) -> Picture:
         """The picture asked for last; drawn again where another renderer of this canvas drew since."""
         picture = self._picture
-        if picture is None or not self._canvas.holds(picture.view):
+        if picture is None or not self.canvas.holds(picture.view):
             raise ValueError("renderer: expected draw(...) before, received no view")
         picture.lay()
         return picture
@@ -369,7 +352,7 @@ class SplatRenderer:
         if self._narrowed is None or self._narrowed[0] != asked.answer.key:
             return asked
         key, relevance, name = self._narrowed
-        layers = asked.picture.view.narrowed(name, relevance)
+        layers = asked.picture.view.brought("narrowed", name, len(relevance), lambda: relevance)
         return asked._replace(answer=Answer(layers, asked.answer.num_phrases, (*key, name)))
 
     @property
@@ -440,7 +423,7 @@ class SplatRenderer:
 
     def _prepared(
         self, camera: Camera, share: float, quick: bool = False, late: bool = False
-    ) -> tuple[LiveScene, Level | LayeredLevel, ViewTargets]:
+    ) -> tuple[LiveScene, Prepared, ViewTargets]:
         """What to draw, sorted and projected, and where.
 
         Raises:
@@ -448,16 +431,25 @@ class SplatRenderer:
         """
         if not context_lives(self._ctx):
             raise GraphicsError("the OpenGL context of this view is gone; open the scene again")
-        if self._scene is None:
-            raise ValueError("draw: expected set_scene before, received no scene")
-        view = self._canvas.view((camera.width, camera.height))
-        level = self._scene.level(share)
+        scene = self._live("draw")
+        view = self.canvas.view((camera.width, camera.height))
+        level = scene.level(share)
         level.prepare(camera, quick, late)
-        return self._scene, level, view
+        return scene, level, view
+
+    def _live(self, who: str) -> LiveScene:
+        """The scene.
+
+        Raises:
+            ValueError: there is none.
+        """
+        if self._scene is None:
+            raise ValueError(f"{who}: expected set_scene before, received no scene")
+        return self._scene
 
     def _quick(self, moving: bool) -> bool:
         """Whether a moving picture has fewer and smaller layers than one at rest."""
-        return moving and not self._canvas.hardware.blends_all
+        return moving and not self.canvas.hardware.blends_all
 
     def _asked(self) -> Answered:
         """As `answered`, whatever was narrowed."""
@@ -483,4 +475,4 @@ class SplatRenderer:
             return
         self._release_scene()
         if self._own_canvas:
-            self._canvas.release()
+            self.canvas.release()

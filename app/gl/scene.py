@@ -16,7 +16,7 @@ from langflash_core.scene.thin import thin_with_rows
 from langflash_core.types import Scene
 
 from .colours import feature_axes
-from .layered import LayeredLevel
+from .layered import LayeredLevel, Prepared
 from .level import Level
 from .painter import Painter
 from .photos import PhotoDepths
@@ -55,9 +55,9 @@ class LiveScene:
         self._marks: tuple[np.ndarray, np.ndarray] | None = None  # shown, tints
         self._changes: tuple[Change, ...] = ()
         self._photos: dict[bool, PhotoDepths] = {}  # by whether each sees its own Gaussians alone
-        self._levels: dict[float, Level | LayeredLevel] = {}  # by share of the Gaussians
+        self._levels: dict[float, Prepared] = {}  # by share of the Gaussians
         self._next: dict[float, Thinned] = {}  # to come in place of those
-        self._past: list[Level | LayeredLevel] = []  # which the picture on show may still need
+        self._past: list[Prepared] = []  # which the picture on show may still need
         self._near: Nearness | None = None
         if thinned is None:
             self.level(share)
@@ -65,7 +65,7 @@ class LiveScene:
             self.give(share, thinned)
 
     @property
-    def whole(self) -> Level | LayeredLevel:
+    def whole(self) -> Prepared:
         """Of all Gaussians."""
         return self.level(1.0)
 
@@ -87,7 +87,7 @@ class LiveScene:
         np.add.at(masses, semantics.weight_ids.numpy(), carried.nan_to_num(0, 0, 0).numpy())
         return feature_axes(semantics.dictionary.double().numpy(), masses)
 
-    def level(self, share: float) -> Level | LayeredLevel:
+    def level(self, share: float) -> Prepared:
         """The level of so many Gaussians; made once, until another is given."""
         following = self._next.pop(share, None)
         if following is not None:

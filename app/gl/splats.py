@@ -1,5 +1,6 @@
 """One scene's Gaussians on the GPU: sorted, projected, and their weights expanded, per camera."""
 
+from collections.abc import Mapping
 from dataclasses import dataclass, replace
 
 import moderngl
@@ -14,8 +15,9 @@ from langflash_core.types import Camera, Gaussians, Scene
 from .buffers import Growing
 from .carried import Carried, CarriedTextures, bytes_of, texels_of
 from .layout import ATOMS_A_LAYER
-from .ordering import Ordering
+from .ordering import Ordering, lens, matrices
 from .shapes import PLACE_FLOATS, MakeShapes, Quads
+from .targets import PREMULTIPLIED, drawing
 from .vertices import Vertices
 
 TINTS = ((0.16, 0.56, 1.0), (1.0, 0.22, 0.20))  # colours of tint 1, selected, and tint 2, to be deleted
@@ -48,7 +50,8 @@ class Drawable:
 
 
 class SplatBuffers:
-    """Owns the vertex data of a scene; `sort` or `follow` choose and order, `project` and `expand` fill.
+    """Owns the vertex data of a scene; `sort` or `follow` choose and order, `project` fills,
+    `splat` and `splat_weights` draw.
 
     Gaussians with a value or a weight that is not finite are left out, and those
     below opacity 1/255, which no pixel can show. Footprints end where alpha falls below 1/255 and, where
@@ -159,8 +162,7 @@ class SplatBuffers:
             },
             varyings=("out_place", "out_shape", "out_colour"),
         )
-        viewmat = camera.viewmat.detach().cpu().double().numpy()
-        K = camera.K.detach().cpu().double().numpy()
+        viewmat, _ = matrices(camera)
         eye = -viewmat[:3, :3].T @ viewmat[:3, 3]
         gain, offset = _PLAIN if camera.light is None else camera.light.cpu().numpy()
         set_uniforms(
@@ -168,8 +170,7 @@ class SplatBuffers:
             viewmat=viewmat,
             eye=eye,
             eye_rest=eye - eye.astype(np.float32),
-            pinhole=np.array([K[0, 0], K[1, 1], K[0, 2], K[1, 2]]),
-            orthographic=int(camera.orthographic),
+            **lens(camera),
             image_size=(float(camera.width), float(camera.height)),
             light_gain=gain,
             light_offset=offset,
@@ -177,12 +178,6 @@ class SplatBuffers:
         )
         self._transform(program, self._vertices.content, self.places)
         self.shapes.measure(self.places, len(self.order), (camera.width, camera.height))
-
-    def expand(self, atoms: np.ndarray, first: int, num_layers: int) -> moderngl.Buffer:
-        """Dense weights of `num_layers` layers of `atoms`, from place `first` on, in draw order."""
-        out = self._expanded.at_least(bytes_of(num_layers) * self.num_gaussians)
-        self._transform(self._textures.ready(atoms, first, num_layers), [], out)
-        return out
 
     def _transform(self, program: moderngl.Program, content: list, out: moderngl.Buffer) -> None:
         key = ("transform", program.glo)
@@ -194,34 +189,63 @@ class SplatBuffers:
 
     # --- pictures ---------------------------------------------------------------------------
 
-    def in_order(self, numbers: np.ndarray) -> moderngl.Buffer:
-        """Numbers (N, n) float32 of all Gaussians as those of the chosen ones, in draw order."""
-        out = self._numbers.at_least(numbers.nbytes)
-        out.write(numbers[self.order].tobytes())
-        return out
-
-    def draw(
-        self,
-        program: moderngl.Program,
-        weights: moderngl.Buffer | None = None,
-        num_layers: int = 0,
-        colour: bool = True,
+    def splat(
+        self, into: moderngl.Framebuffer, numbers: np.ndarray | None = None, depth: bool = True
     ) -> None:
-        """One shape per chosen Gaussian, with its colour, `num_layers` of weights, or both.
+        """Colour and depth of the chosen Gaussians, projected, which every picture begins with; into a
+        framebuffer of the size that the projection was for, or into the corner of a larger one.
 
         Args:
-            program: of quad.vert with the defines of `shapes`.
+            numbers: (N, 3 L) float32, that the Gaussians carry into L layers behind colour and depth.
+            depth: whether the framebuffer has it beside the colour; without, there are no numbers.
         """
+        num_layers = 0 if numbers is None else numbers.shape[1] // ATOMS_A_LAYER
+        defines = {"COLOUR": 1} if depth else {"COLOUR": 1, "ALONE": 1}
+        carried = None
+        if numbers is not None and len(self.order):
+            carried = self._numbers.at_least(numbers.nbytes)
+            carried.write(numbers[self.order].tobytes())
+        into.clear()
+        self._draw("colour.frag", into, defines, carried, num_layers)
+
+    def splat_weights(
+        self, atoms: np.ndarray, first: int, num_layers: int, into: moderngl.Framebuffer
+    ) -> None:
+        """Dense weights in `num_layers` layers of `atoms`, from place `first` on, over what is there."""
+        out = self._expanded.at_least(bytes_of(num_layers) * self.num_gaussians)
+        self._transform(self._textures.ready(atoms, first, num_layers), [], out)
+        self._draw("weights.frag", into, {}, out, num_layers)
+
+    def _draw(
+        self,
+        fragment: str,
+        into: moderngl.Framebuffer,
+        defines: Mapping[str, float],
+        weights: moderngl.Buffer | None,
+        num_layers: int,
+    ) -> None:
+        """One shape per chosen Gaussian, with its colour, `num_layers` of weights, or both."""
+        layers = {"LAYERS": num_layers} if num_layers else {}
+        program = self._programs.get("quad.vert", fragment, {**defines, **layers, **self.shapes.defines})
+        set_uniforms(program, image_size=tuple(float(n) for n in into.size))
+        with drawing(into, PREMULTIPLIED):
+            if len(self.order):
+                self.shapes.render(
+                    self._vao(program, "COLOUR" in defines, weights, num_layers), len(self.order)
+                )
+
+    def _vao(
+        self, program: moderngl.Program, colour: bool, weights: moderngl.Buffer | None, num_layers: int
+    ) -> moderngl.VertexArray:
         key = ("draw", program.glo, None if weights is None else weights.glo)
         if key not in self._vaos:
-            footprint, each = ("in_place", "in_shape"), self.shapes.each
-            content: list[tuple] = [(self.places, f"4f 4f 12x{each}", *footprint)]
-            if colour:
-                content = [(self.places, f"4f 4f 3f{each}", *footprint, "in_colour")]
+            each = self.shapes.each
+            names = ("in_place", "in_shape", "in_colour") if colour else ("in_place", "in_shape")
+            content = [(self.places, f"4f 4f {'3f' if colour else '12x'}{each}", *names)]
             if weights is not None:
                 content.append((weights, f"{ATOMS_A_LAYER * num_layers}f{each}", "in_weights"))
             self._vaos[key] = self._ctx.vertex_array(program, content)
-        self.shapes.render(self._vaos[key], len(self.order))
+        return self._vaos[key]
 
     def release(self) -> None:
         """Give every buffer back; harmless twice."""

@@ -72,6 +72,12 @@ def read(texture: moderngl.Texture | moderngl.TextureArray) -> np.ndarray:
     return np.frombuffer(texture.read(), NUMPY_TYPES[texture.dtype]).astype(np.float32)
 
 
+def mean_depths(sums: np.ndarray, least: float) -> np.ndarray:
+    """Depths (H, W) float32 of sums (H, W, 2) of T alpha z and of T alpha; 0 below an alpha of `least`."""
+    alphas = sums[..., 1]
+    return np.where(alphas >= least, sums[..., 0] / np.maximum(alphas, least), 0).astype(np.float32)
+
+
 class ColourTarget:
     """Premultiplied colour + alpha; beside it sum of T alpha z and of T alpha, always float32.
 
@@ -115,22 +121,17 @@ class LayerTarget:
         self, first: int, count: int, beside: tuple[moderngl.Texture, ...] = ()
     ) -> moderngl.Framebuffer:
         """A framebuffer whose attachments are `beside` and then `count` layers from `first` on."""
-        return self.chosen(range(first, first + count), beside)
-
-    def chosen(
-        self, chosen: Sequence[int], beside: tuple[moderngl.Texture, ...] = ()
-    ) -> moderngl.Framebuffer:
-        """A framebuffer whose attachments are `beside` and then these layers."""
-        key = (len(chosen), *(texture.glo for texture in beside))
+        key = (count, *(texture.glo for texture in beside))
         if key not in self._framebuffers:
             stand_in = self._ctx.texture(self.array.size[:2], 4, dtype=self._dtype)
-            self._framebuffers[key] = self._ctx.framebuffer([*beside, *[stand_in] * len(chosen)])
+            self._framebuffers[key] = self._ctx.framebuffer([*beside, *[stand_in] * count])
             stand_in.release()
         framebuffer = self._framebuffers[key]
         previous = bound_framebuffer(self._ctx)
         framebuffer.use()
-        for place, layer in enumerate(chosen, len(beside)):
-            self._attach(_GL_FRAMEBUFFER, _GL_COLOR_ATTACHMENT0 + place, self.array.glo, 0, layer)
+        for place in range(count):
+            attachment = _GL_COLOR_ATTACHMENT0 + len(beside) + place
+            self._attach(_GL_FRAMEBUFFER, attachment, self.array.glo, 0, first + place)
         previous.use()
         return framebuffer
 

@@ -25,29 +25,19 @@ class Vertices:
                 large scene's bytes, never copied as a whole.
         """
         self.degree = min(math.isqrt(sh.shape[1]) - 1, MAX_SHOWN_DEGREE)
-        self.sh_vec4s = (self._num_numbers + 3) // 4
+        self._num_numbers = 3 * (self.degree + 1) ** 2  # coefficients of that degree
+        self.sh_vec4s = -(-self._num_numbers // 4)
+        self._stride = 16 * self.sh_vec4s  # bytes: they are flat, padded to whole vec4s
         self._shapes = [buffer_of(ctx, values) for values in _shapes(gaussians)]
         self._harmonics = ctx.buffer(reserve=max(4, self._stride * len(rows)))
         self._write_harmonics(sh.numpy(), rows)
         self._tints = buffer_of(ctx, np.zeros(len(rows), np.uint8))
 
-    @property
-    def _num_numbers(self) -> int:
-        """Coefficients of the shown degree."""
-        return 3 * (self.degree + 1) ** 2
-
-    @property
-    def _stride(self) -> int:
-        """Bytes: they are flat, padded to whole vec4s."""
-        return 16 * self.sh_vec4s
-
     def _write_harmonics(self, sh: np.ndarray, rows: np.ndarray) -> None:
         for first in range(0, len(rows), _ROWS_AT_ONCE):
-            some = sh[rows[first : first + _ROWS_AT_ONCE]].reshape(-1, 3 * sh.shape[1])[
-                :, : self._num_numbers
-            ]
+            some = sh[rows[first : first + _ROWS_AT_ONCE]]
             padded = np.zeros((len(some), 4 * self.sh_vec4s), np.float32)
-            padded[:, : self._num_numbers] = some
+            padded[:, : self._num_numbers] = some.reshape(len(some), -1)[:, : self._num_numbers]
             self._harmonics.write(padded.tobytes(), offset=self._stride * first)
 
     def place(self, gaussians: Gaussians, sh: Tensor, rows: np.ndarray) -> None:

@@ -1,17 +1,17 @@
 """What lives as long as the picture's size: colour, depth, weight maps, relevance, pictures to show."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Hashable, Sequence
+from typing import Literal
 
 import moderngl
 import numpy as np
 
 from .answers import Answers, MakeAnswers
 from .blend import Blend
-from .colour import draw_colour
 from .display import Display
 from .fast import FastPasses
+from .layered import Prepared
 from .layout import PHRASES_A_LAYER, num_groups
-from .level import Prepared
 from .packed import PackedMaps
 from .painter import Painter
 from .question import Question
@@ -44,10 +44,8 @@ class ViewTargets:
         self._answers: dict[MakeAnswers, Answers] = {}
         self._fast: FastPasses | None = None
         self._blend: Blend | None = None
-        self._told = Layers(painter.ctx, size, "f4")
-        self._tells = (0, 0)  # picture and question of `_told`
-        self._narrowed = Layers(painter.ctx, size, "f4")
-        self._narrows = 0  # what `_narrowed` holds
+        self._brought = {kind: Layers(painter.ctx, size, "f4") for kind in ("told", "narrowed")}
+        self._holds: dict[str, Hashable] = {}  # what of each kind
 
     def draw_colour(self, level: Prepared) -> None:
         """Colour and depth of the level as it stands, unless they are there."""
@@ -67,7 +65,7 @@ class ViewTargets:
         depth: bool = True,
     ) -> None:
         (part,) = level.parts
-        draw_colour(self._painter.programs, part.splats, into, numbers, depth)
+        part.splats.splat(into, numbers, depth)
         self._painter.passes["colour"] += 1
 
     def _blended(
@@ -108,28 +106,24 @@ class ViewTargets:
             texture.write(np.ascontiguousarray(values, NUMPY_TYPES[texture.dtype]))
         self._shown = key
 
-    def told(self, key: int, question: Question, make: Callable[[], np.ndarray]) -> LayerTarget:
-        """Relevance (P, H, W) that is made elsewhere, of the picture so named, unless it is there."""
-        told = self._told.exactly(num_groups(question.num_phrases))
-        if (key, question.key) != self._tells:
-            self._lay(make(), told)
-            self._tells = key, question.key
-        return told
-
-    def narrowed(self, name: int, relevance: np.ndarray) -> LayerTarget:
-        """Relevance (P, H, W) so named, in place of what the picture answers, unless it is there."""
-        narrowed = self._narrowed.exactly(num_groups(len(relevance)))
-        if name != self._narrows:
-            self._lay(relevance, narrowed)
-            self._narrows = name
-        return narrowed
-
-    def _lay(self, relevance: np.ndarray, into: LayerTarget) -> None:
-        width, height = self.size
-        texels = np.zeros((into.num_layers, height, width, PHRASES_A_LAYER), np.float32)
-        for phrase, values in enumerate(relevance):
-            texels[phrase // PHRASES_A_LAYER, :, :, phrase % PHRASES_A_LAYER] = values
-        into.array.write(texels)
+    def brought(
+        self,
+        kind: Literal["told", "narrowed"],
+        name: Hashable,
+        num_phrases: int,
+        make: Callable[[], np.ndarray],
+    ) -> LayerTarget:
+        """Relevance (P, H, W) of this name that is made elsewhere, unless it is there: told in place of what
+        is drawn here, or narrowed in place of what the picture answers."""
+        layers = self._brought[kind].exactly(num_groups(num_phrases))
+        if self._holds.get(kind) != name:
+            width, height = self.size
+            texels = np.zeros((layers.num_layers, height, width, PHRASES_A_LAYER), np.float32)
+            for phrase, values in enumerate(make()):
+                texels[phrase // PHRASES_A_LAYER, :, :, phrase % PHRASES_A_LAYER] = values
+            layers.array.write(texels)
+            self._holds[kind] = name
+        return layers
 
     def exact(self, question: Question, level: Prepared) -> LayerTarget:
         """Relevance from the weight maps, which are drawn unless they are there."""
@@ -190,5 +184,5 @@ class ViewTargets:
         if self._blend is not None:
             self._blend.release()
         self._blend = None
-        for owned in (self._narrowed, self._told, self.display, self.packed, self.maps, self.colour):
+        for owned in (*self._brought.values(), self.display, self.packed, self.maps, self.colour):
             owned.release()

@@ -14,7 +14,6 @@ from langflash_core.types import Camera, Gaussians, Scene, Semantics
 
 from .answers import ShaderAnswers
 from .canvas import Canvas
-from .colour import draw_colour
 from .display import Answer, Drawn
 from .layered import MOVING
 from .question import Question
@@ -40,18 +39,14 @@ def warm_layers(canvas: Canvas, splats: MakeSplats = SplatBuffers) -> Iterator[N
         level, view = scene.whole, canvas.view((SIDE, SIDE))
         level.prepare(_CAMERA, quick)
         yield
-        draw_colour(canvas.painter.programs, level.parts[0].splats, view.colour.framebuffer)
+        part = level.parts[0]
+        part.splats.splat(view.colour.framebuffer)
         yield
         view.draw_colour(level)
         yield
         question = _question()
         passes = view.fast_passes(question.num_phrases)
-        draw_colour(
-            canvas.painter.programs,
-            level.parts[0].splats,
-            passes.framebuffer,
-            question.numbers(level.parts[0]),
-        )
+        part.splats.splat(passes.framebuffer, question.numbers(part))
         yield
         passes.run(question.compiled)
         yield

@@ -8,14 +8,12 @@ from functools import reduce
 import moderngl
 import numpy as np
 
-from langflash_core.base.graphics import set_uniforms
-
 from .blend import add_maps
+from .layered import Prepared
 from .layout import ATOMS_A_LAYER, ATOMS_A_PASS, LAYERS_A_PASS, num_layers
-from .level import Prepared
 from .painter import Painter
 from .splats import SplatBuffers
-from .targets import NUMPY_TYPES, PREMULTIPLIED, Layers, LayerTarget, drawing
+from .targets import NUMPY_TYPES, Layers, LayerTarget
 
 _ROWS_AT_ONCE = 8  # of pixels, to be read: a megabyte or two, which stay in a core's cache
 
@@ -124,7 +122,7 @@ class WeightMaps:
         """One pass, of `count` layers of the atoms from place `first` on, over what is there."""
         if not len(splats.order):
             return
-        splat_weights(self.painter, splats, splats.expand(atoms, first, count), count, target)
+        splats.splat_weights(atoms, first, count, target)
         self.painter.passes["weights"] += 1
 
     def release(self) -> None:
@@ -132,17 +130,6 @@ class WeightMaps:
         self.layers.release()
         self._own.release()
         self._maps = None
-
-
-def splat_weights(
-    painter: Painter, splats: SplatBuffers, weights: moderngl.Buffer, count: int, into: moderngl.Framebuffer
-) -> None:
-    """Splat `count` layers of weights, of the Gaussians chosen in draw order, over what is there."""
-    defines = {"LAYERS": count, **splats.shapes.defines}
-    program = painter.programs.get("quad.vert", "weights.frag", defines)
-    set_uniforms(program, image_size=tuple(float(n) for n in into.size))
-    with drawing(into, PREMULTIPLIED):
-        splats.draw(program, weights, count, colour=False)
 
 
 MakeMaps = Callable[[Painter, tuple[int, int], str], WeightMaps]

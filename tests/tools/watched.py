@@ -36,7 +36,9 @@ WATCHED = {
     "app.gl.view": ("ViewTargets.draw_colour", "ViewTargets.fast"),
     "app.gl.weights": ("WeightMaps.draw",),
     "app.gl.processor.cell_maps": ("CellMaps.draw",),
-    "app.gl.processor.host": ("HostAnswers.answer", "read_maps", "inverse_norms"),
+    "app.gl.processor.host": (
+        "HostAnswers.measure", "HostAnswers.scale", "HostAnswers.compare", "read_maps", "inverse_norms",
+    ),
     "app.gl.packed": ("PackedMaps._of",),
     "app.gl.display": ("Display._filled",),
     "langflash_core.base.graphics": ("Programs.get",),

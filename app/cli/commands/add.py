@@ -7,15 +7,11 @@ from typing import TextIO
 from langflash_core.base.files import check_output_file
 
 from ..files import checked_photos, checked_scene
-from ..report import ProgressBar, say_warnings, write_json
+from ..report import ProgressBar, say_warnings, tell
 
 
 def run(args: Namespace, out: TextIO) -> None:
-    """The scene of -o: the one that there is, with a layer of each of these photos.
-
-    Raises:
-        LangFlashError: the scene, a photo or the output cannot be used.
-    """
+    """The scene of -o: the one that there is, with a layer of each of these photos."""
     start = time.perf_counter()
     checked_scene(args.scene)
     photos = checked_photos(args.photos)
@@ -32,11 +28,7 @@ def run(args: Namespace, out: TextIO) -> None:
         save(grown, args.output)
     say_warnings([line for line in grown.record.warnings if line not in scene.record.warnings])
     seconds = round(time.perf_counter() - start, 3)
-    if args.json:
-        return write_json({"scene": str(args.output), **describe(grown), "seconds": seconds}, out)
     more = grown.num_views - scene.num_views
-    print(
-        f"{args.output}: {more} photo{'s' * (more > 1)} more, {grown.num_views} in all; "
-        f"{len(grown.gaussians):,} Gaussians, {seconds:.1f} s",
-        file=out,
-    )
+    line = f"{args.output}: {more} photo{'s' * (more > 1)} more, {grown.num_views} in all; "
+    line += f"{len(grown.gaussians):,} Gaussians, {seconds:.1f} s"
+    tell(args, {"scene": str(args.output), **describe(grown), "seconds": seconds}, [line], out)

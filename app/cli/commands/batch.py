@@ -18,7 +18,7 @@ from langflash_core.batch.sets import LEDGER, SUMMARY, read_sets
 from langflash_core.errors import InputError, PromptError, WeightsError
 
 from ..crew import crew, processors, threads_said
-from ..report import INTERRUPTED, say_error, write_json
+from ..report import INTERRUPTED, say_error, tell
 from ..table import ProgressTable
 
 MEMORY = {"mini": 1_500_000_000, "full": 7_000_000_000}  # bytes that a worker may come to hold
@@ -26,11 +26,7 @@ EXPORTS = tuple(kind for kind in ALL_OUT if kind != ".langflash")  # the scene i
 
 
 def run(args: Namespace, out: TextIO) -> int:
-    """Do what is left to do of all sets; the exit code: 0 all are done, 1 some failed, 130 after Ctrl-C.
-
-    Raises:
-        LangFlashError: sets, options, output or cluster cannot be used.
-    """
+    """Do what is left to do of all sets; the exit code: 0 all are done, 1 some failed, 130 after Ctrl-C."""
     order = _order(args)
     check_folder(args.output)
     sets = read_sets(args.sets, args.output)
@@ -51,7 +47,11 @@ def _worked_off(
         finish(ledger, names)
         return True
     most = _as_memory_allows(max(1, processors() // (threads_said() or 1)), order.preset)
-    workers = crew(args, lambda threads: _opening(order, threads), len(to_do), most)
+
+    def opening(threads: int) -> partial:
+        return partial(in_program, "cli.places", "open_maker", order, threads)
+
+    workers = crew(args, opening, len(to_do), most)
     try:
         with ProgressTable(len(to_do), workers) as table:
             run_jobs(to_do, ledger, workers, names, table.told, table.tick)
@@ -61,11 +61,7 @@ def _worked_off(
 
 
 def _order(args: Namespace) -> Order:
-    """The options, checked as far as it can be done without torch.
-
-    Raises:
-        LangFlashError: one cannot be used, or what it needs is not installed.
-    """
+    """The options, checked as far as it can be done without torch."""
     prompts = tuple(trim_phrases(args.prompt or []))
     exports = tuple(dict.fromkeys(args.export or []))
     _check_exports(exports, prompts)
@@ -103,10 +99,6 @@ def _check_exports(exports: Sequence[str], prompts: Sequence[str]) -> None:
             check_encoder()
 
 
-def _opening(order: Order, threads: int) -> partial:
-    return partial(in_program, "cli.places", "open_maker", order, threads)
-
-
 def _as_memory_allows(count: int, preset: str) -> int:
     """So many workers, or fewer that fit into this machine's memory."""
     try:
@@ -131,19 +123,11 @@ def _told(
         "ledger": str(args.output / LEDGER),
         "summary": str(args.output / SUMMARY),
     }
-    if args.json:
-        write_json(document, out)
-    else:
-        print(_sentence(document), file=out)
+    done = f"{args.output}: {document['done']} of {len(jobs)} sets done"
+    done += f" ({before} before)" if before else ""
+    done += f", {failed} failed" if failed else ""
+    tell(args, document, [f"{done}; see {document['summary']}"], out)
     if stopped:
         say_error("stopped; the same command continues from here")
         return INTERRUPTED
     return int(failed > 0)
-
-
-def _sentence(document: dict) -> str:
-    done, total, before = document["done"], document["sets"], document["done_before"]
-    sentence = f"{document['output']}: {done} of {total} sets done"
-    sentence += f" ({before} before)" if before else ""
-    sentence += f", {document['failed']} failed" if document["failed"] else ""
-    return f"{sentence}; see {document['summary']}"

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, TextIO
 from langflash_core.base.files import check_folder, readable_file, staged_folder
 from langflash_core.errors import InputError, OutputError, PromptError, SceneFileError
 
-from ..report import ProgressBar, write_json
+from ..report import ProgressBar, tell, write_json
 from ..scenes import open_scene
 
 if TYPE_CHECKING:
@@ -16,31 +16,23 @@ FRAMES = 8
 
 
 def run(args: Namespace, out: TextIO) -> None:
-    """Measure every mode on a scene or on generated ones; print a table, write JSON and CSV.
-
-    Raises:
-        LangFlashError: the scene, the phrases or the output cannot be used, or OpenGL is missing.
-    """
+    """Measure every mode on a scene or on generated ones; print a table, write JSON and CSV."""
     _check(args)
-    from ...bench import measured_cases, table
+    from ...bench import csv_text, measured_cases, table
 
     cases = _cases(args)
     with ProgressBar() as progress:
         measured = measured_cases(cases, args.only, progress)
     if args.output is not None:
-        _write(args, measured)
-    if args.json:
-        write_json(measured, out)
-    else:
-        print(table(measured), file=out)
+        with staged_folder(args.output) as staging:
+            with (staging / "bench.json").open("w", encoding="ascii") as stream:
+                write_json(measured, stream)
+            (staging / "bench.csv").write_text(csv_text(measured), encoding="utf-8")
+    tell(args, measured, [table(measured)], out)
 
 
 def _check(args: Namespace) -> None:
-    """What can be said before anything is loaded.
-
-    Raises:
-        InputError: options that contradict each other, or an output that cannot be made.
-    """
+    """What can be said before anything is loaded."""
     generated = args.paper or args.synthetic is not None
     if args.scene is None and not generated:
         raise InputError("there is no scene to measure; give one, or --synthetic 100000, or --paper")
@@ -73,13 +65,3 @@ def _cases(args: Namespace) -> "list[Case]":
     if args.atoms is not None:
         return [generated_atoms_case(name, scene, args.atoms, args.size, frames)]
     return [scene_case(name, scene, args.size, frames, args.prompt)]
-
-
-def _write(args: Namespace, measured: dict) -> None:
-    """bench.json and bench.csv."""
-    from ...bench import csv_text
-
-    with staged_folder(args.output) as staging:
-        with (staging / "bench.json").open("w", encoding="ascii") as stream:
-            write_json(measured, stream)
-        (staging / "bench.csv").write_text(csv_text(measured), encoding="utf-8")

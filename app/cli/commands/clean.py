@@ -10,7 +10,7 @@ from langflash_core.mending.settings import RECIPE_DEFAULTS
 
 from ..files import checked_scene
 from ..renderers import open_renderer
-from ..report import ProgressBar, write_json
+from ..report import ProgressBar, tell
 from ..scenes import open_scene
 
 if TYPE_CHECKING:
@@ -21,11 +21,7 @@ if TYPE_CHECKING:
 
 
 def run(args: Namespace, out: TextIO) -> None:
-    """Clean it up, write the scene, and tell what went.
-
-    Raises:
-        LangFlashError: the scene, the recipe, an option or the output cannot be used; nothing is written.
-    """
+    """Clean it up, write the scene, and tell what went."""
     if args.recipe is not None:
         readable_file(args.recipe, "recipe", InputError)
     recipe = _recipe(args)
@@ -54,22 +50,21 @@ def run(args: Namespace, out: TextIO) -> None:
         make_folder(args.save_recipe.parent)
         save_recipe(recipe, args.save_recipe)
     counts = {name: count for name, count in found.counts.items() if count}
+    total, removed = len(scene.gaussians), int(found.rows.sum())
+    filled = len(done.gaussians) - total + removed
     document = {
         "scene": str(args.output),
-        "removed": int(found.rows.sum()),
-        "left": len(scene.gaussians) - int(found.rows.sum()),
-        "filled": len(done.gaussians) - len(scene.gaussians) + int(found.rows.sum()),
+        "removed": removed,
+        "left": total - removed,
+        "filled": filled,
         "counts": counts,
         "recipe": recipe.document(),
     }
-    if args.json:
-        write_json(document, out)
-        return
-    print(f"{args.output}: {document['removed']:,} of {len(scene.gaussians):,} Gaussians removed", file=out)
-    for name, count in counts.items():
-        print(f"  {count:,} {name}", file=out)
-    if document["filled"]:
-        print(f"  {document['filled']:,} in their holes, made of what is around them", file=out)
+    lines = [f"{args.output}: {removed:,} of {total:,} Gaussians removed"]
+    lines += [f"  {count:,} {name}" for name, count in counts.items()]
+    if filled:
+        lines.append(f"  {filled:,} in their holes, made of what is around them")
+    tell(args, document, lines, out)
 
 
 def _recipe(args: Namespace) -> Recipe:

@@ -14,12 +14,7 @@ from ..report import ProgressBar
 
 
 def run(args: Namespace, out: TextIO) -> None:
-    """Write what the ending of -o and the other words say.
-
-    Raises:
-        LangFlashError: the scene, a phrase, the camera or the output cannot be used, or
-            nothing answers.
-    """
+    """Write what the ending of -o and the other words say."""
     from langflash_core.writing import prepare_output, write
 
     from ..renderers import open_renderer
@@ -43,13 +38,7 @@ def _narrows(request: ExportRequest) -> bool:
 
 
 def request_of(args: Namespace) -> ExportRequest:
-    """What the words ask for; every field of a request is an option of its name.
-
-    Raises:
-        PromptError: a phrase is empty.
-    """
-    said = {
-        field.name: getattr(args, field.name) for field in fields(ExportRequest) if field.name != "prompts"
-    }
+    """What the words ask for; every field of a request is an option of its name."""
+    said = {each.name: getattr(args, each.name) for each in fields(ExportRequest) if each.name != "prompts"}
     said |= {"ortho": bool(args.ortho), "beside": tuple(args.beside)}
     return ExportRequest(**said, prompts=tuple(trim_phrases(args.prompt or [])))

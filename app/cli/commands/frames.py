@@ -25,17 +25,13 @@ from langflash_core.images.still_names import is_still, shown_name
 from langflash_core.images.strip import Choice, Strip, choose, notes_on
 
 from ..films import look_through, sentence, summary
-from ..report import ProgressBar, say_warnings, write_json
+from ..report import ProgressBar, say_warnings, tell
 
 INDEX = "frames.json"
 
 
 def run(args: Namespace, out: TextIO) -> None:
-    """Look through the film, choose, and write a folder that is whole or as it was.
-
-    Raises:
-        LangFlashError: the film or an output cannot be used.
-    """
+    """Look through the film, choose, and write a folder that is whole or as it was."""
     _check_output(args)
     with ProgressBar() as progress:
         strip = look_through(args.film, progress, start=args.start, end=args.end, every=args.every)
@@ -50,16 +46,10 @@ def run(args: Namespace, out: TextIO) -> None:
             _write_sheet(args.sheet, args.output, strip, choice)
             document["sheet"] = str(args.sheet)
     say_warnings(notes_on(strip, choice))
-    if args.json:
-        write_json(document, out)
-    else:
-        print(f"{args.output}: {sentence(strip, choice)}", file=out)
+    tell(args, document, [f"{args.output}: {sentence(strip, choice)}"], out)
 
 
 def _check_output(args: Namespace) -> None:
-    """Raises:
-    OutputError: something else is in the way, or nothing can be written there.
-    """
     folder = args.output
     if os.path.isfile(folder):
         raise OutputError(f"cannot write {folder}: a file of that name is in the way; choose another -o")

@@ -9,7 +9,7 @@ from langflash_core.errors import InputError
 from ...places import forget_pictures
 from ..files import checked_scene
 from ..renderers import open_renderer
-from ..report import ProgressBar, write_json
+from ..report import ProgressBar, tell
 from ..scenes import open_scene, say_hints
 
 if TYPE_CHECKING:
@@ -17,11 +17,7 @@ if TYPE_CHECKING:
 
 
 def run(args: Namespace, out: TextIO) -> None:
-    """Hide it, write the scene, and tell what was done.
-
-    Raises:
-        LangFlashError: the scene, a phrase, an option or the output cannot be used; nothing is written.
-    """
+    """Hide it, write the scene, and tell what was done."""
     if args.how == "remove" and args.blocks is not None:
         raise InputError("what is removed has no blocks; leave --blocks out, or choose --how pixels")
     if args.how != "remove" and args.open:
@@ -60,10 +56,7 @@ def run(args: Namespace, out: TextIO) -> None:
     if args.preview is not None and picture is not None:
         write_picture(args.preview, picture)
     document = {"scene": str(args.output), "prompts": args.prompts, **report.document()}
-    if args.json:
-        write_json(document, out)
-    else:
-        print("\n".join(_lines(document, report)), file=out)
+    tell(args, document, _lines(document, report), out)
 
 
 def _lines(document: dict[str, Any], report: "Hidden") -> list[str]:

@@ -1,6 +1,7 @@
 """`langflash info`: what a scene file holds; with --limits, how much of a file is let in."""
 
 from argparse import Namespace
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, TextIO
 
@@ -8,20 +9,16 @@ from langflash_core.base.files import readable_file
 from langflash_core.base.limits import LIMITS
 from langflash_core.errors import InputError, SceneFileError
 
-from ..report import write_json
+from ..report import tell, write_json
 from ..sbom import bill_of_materials
 
 _SHOWS = 1 / 255  # the smallest step of an 8-bit picture
 
 
 def run(args: Namespace, out: TextIO) -> None:
-    """Print counts, sizes, timings, and what pruning saved.
-
-    Raises:
-        SceneFileError: missing, truncated or foreign. InputError: neither a scene nor --limits was named.
-    """
+    """Print counts, sizes, timings, and what pruning saved."""
     if args.limits:
-        return _print_limits(args.json, out)
+        return _tell_limits(args, out)
     if args.sbom:
         return write_json(bill_of_materials(), out)
     if args.scene is None:
@@ -31,18 +28,17 @@ def run(args: Namespace, out: TextIO) -> None:
         **_described(args.scene, args.axes),
         "file_bytes": args.scene.stat().st_size,
     }
-    if args.json:
-        write_json(document, out)
-    else:
-        print("\n".join(_lines(_for_people(_in_words(document)))), file=out)
+    return tell(args, document, _told(document), out)
 
 
-def _print_limits(as_json: bool, out: TextIO) -> None:
-    if as_json:
-        return write_json({"limits": {limit.name: limit.value for limit in LIMITS}}, out)
+def _told(document: dict[str, Any]) -> Iterator[str]:
+    yield from _lines(_for_people(_in_words(document)))
+
+
+def _tell_limits(args: Namespace, out: TextIO) -> None:
     widths = max(len(limit.variable) for limit in LIMITS), max(len(limit.told()) for limit in LIMITS)
-    for limit in LIMITS:
-        print(f"{limit.variable:{widths[0]}}  {limit.told():>{widths[1]}}  {limit.what}", file=out)
+    lines = (f"{one.variable:{widths[0]}}  {one.told():>{widths[1]}}  {one.what}" for one in LIMITS)
+    tell(args, {"limits": {limit.name: limit.value for limit in LIMITS}}, lines, out)
 
 
 def _described(path: Path, axes: str | None) -> dict[str, Any]:

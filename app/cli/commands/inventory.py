@@ -11,11 +11,11 @@ from langflash_core.base.request import ExportRequest
 from langflash_core.errors import InputError
 
 from ..files import checked_scene
-from ..report import ProgressBar, write_json
+from ..report import ProgressBar, tell
 
 if TYPE_CHECKING:
     from langflash_core.inventory import Inventory
-    from langflash_core.inventory.beside import Difference, Pair
+    from langflash_core.inventory.beside import Difference
     from langflash_core.types import Scene
 
 _UNLIKE = 1.25  # times: more than guesses of lengths are said to be off
@@ -23,11 +23,7 @@ FILES = (".html", ".csv", ".json", ".svg", ".dxf", ".langflash")
 
 
 def run(args: Namespace, out: TextIO) -> None:
-    """List the things of a scene, write what -o names, and compare with the scene of --beside.
-
-    Raises:
-        LangFlashError: a scene, a name or an output cannot be used, or the scenes show no common room.
-    """
+    """List the things of a scene, write what -o names, and compare with the scene of --beside."""
     checked_scene(args.scene)
     if args.beside is not None:
         checked_scene(args.beside)
@@ -35,6 +31,7 @@ def run(args: Namespace, out: TextIO) -> None:
     names = [_named(text) for text in args.name or ()]
     from langflash_core.inventory import inventory
     from langflash_core.writing import prepare_output, write
+    from langflash_core.writing.inventory.tables import difference_document, document
 
     from ..renderers import open_renderer
     from ..scenes import open_scene
@@ -60,24 +57,14 @@ def run(args: Namespace, out: TextIO) -> None:
             (request.output, write(kept, request, renderers=partial(open_renderer, args.backend)))
             for request in requests
         ]
-    if args.json:
-        from langflash_core.writing.inventory.tables import difference_document, document
-
-        said = {"scene": str(args.scene), **document(found)}
-        return write_json(said | ({"beside": difference_document(changed)} if changed else {}), out)
-    print("\n".join(_lines(found)), file=out)
-    if changed is not None:
-        print("\n".join(_changes(changed)), file=out)
-    for path, what in written:
-        print(f"{path}: {what}", file=out)
+    said = {"scene": str(args.scene), **document(found)}
+    said |= {"beside": difference_document(changed)} if changed else {}
+    lines = [*_lines(found), *(_changes(changed) if changed else ())]
+    tell(args, said, [*lines, *(f"{path}: {what}" for path, what in written)], out)
 
 
 def _request(path: Path, args: Namespace) -> ExportRequest:
-    """The order of one file.
-
-    Raises:
-        LangFlashError: nothing of this is written under such a name.
-    """
+    """The order of one file."""
     same = path.suffix.lower() == ".langflash"  # which nothing is lost of
     check_output_file(path, FILES, inputs=[] if same else [args.scene])
     make_folder(path.parent)
@@ -93,11 +80,7 @@ def _named(text: str) -> tuple[str, str]:
 
 
 def _renamed(scene: "Scene", found: "Inventory", names: dict[str, str]) -> "Scene":
-    """The scene that keeps these names; "" takes one away.
-
-    Raises:
-        InputError: there is no such thing.
-    """
+    """The scene that keeps these names; "" takes one away."""
     known = {thing.id for thing in found.things}
     for id in names:
         if id not in known:
@@ -129,11 +112,8 @@ def _changes(changed: "Difference") -> list[str]:
     """A line for what moved, came, went, and what nobody knows."""
     from langflash_core.writing.inventory.words import length
 
-    def way(pair: "Pair") -> str:
-        return f"{pair.before.title} by {length(pair.by, changed.unit)}"
-
     lists = {
-        "moved": [way(pair) for pair in changed.moved],
+        "moved": [f"{pair.before.title} by {length(pair.by, changed.unit)}" for pair in changed.moved],
         "came": [thing.title for thing in changed.came],
         "went": [thing.title for thing in changed.went],
         "stayed": [pair.before.title for pair in changed.stayed],

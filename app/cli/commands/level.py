@@ -2,14 +2,13 @@
 
 import re
 from argparse import Namespace
-from pathlib import Path
 from typing import TYPE_CHECKING, TextIO
 
 from langflash_core.base.files import check_output_file, make_folder
 from langflash_core.errors import InputError
 
 from ..files import checked_scene
-from ..report import write_json
+from ..report import tell
 
 if TYPE_CHECKING:
     from langflash_core.types import Scene
@@ -18,11 +17,7 @@ _PIXEL = re.compile(r"(\d+):([\d.]+),([\d.]+)")
 
 
 def run(args: Namespace, out: TextIO) -> None:
-    """Find or take up, floor, north and scale, say them, and keep them in the scene of -o.
-
-    Raises:
-        LangFlashError: the scene, a point, a length or the output cannot be used.
-    """
+    """Find or take up, floor, north and scale, say them, and keep them in the scene of -o."""
     checked_scene(args.scene)
     if args.output is not None:
         same = args.scene.suffix.lower() == ".langflash"  # which nothing is lost of
@@ -31,6 +26,7 @@ def run(args: Namespace, out: TextIO) -> None:
     metres = _metres(told) if told else None
     from langflash_core import level
     from langflash_core.base.records import world_to_json
+    from langflash_core.export import export
     from langflash_core.scene.report import world_line
 
     from ..scenes import open_scene
@@ -44,27 +40,15 @@ def run(args: Namespace, out: TextIO) -> None:
         if getattr(args, name) is not None:
             scene = level.measured_by(scene, name, getattr(args, name))
     if args.output is not None:
-        _write(scene, args.output)
-    document = {
-        "scene": str(args.output or args.scene),
-        "metric_scale": scene.record.metric_scale,
-        "world": world_to_json(world),
-    }
-    if args.json:
-        return write_json(document, out)
-    known = scene.record.metric_scale
-    print(f"{document['scene']}: {world_line(world, known)}", file=out)
+        make_folder(args.output.parent)
+        export(scene, args.output)
+    known, said = scene.record.metric_scale, str(args.output or args.scene)
+    lines = [f"{said}: {world_line(world, known)}"]
     if known:
-        print(f"1 unit = {known:.4g} m, as you said", file=out)
+        lines.append(f"1 unit = {known:.4g} m, as you said")
     elif world.guess is not None:
-        print("give --length, --ceiling or --door to set the scale", file=out)
-
-
-def _write(scene: "Scene", output: Path) -> None:
-    from langflash_core.export import export
-
-    make_folder(output.parent)
-    export(scene, output)
+        lines.append("give --length, --ceiling or --door to set the scale")
+    tell(args, {"scene": said, "metric_scale": known, "world": world_to_json(world)}, lines, out)
 
 
 def _place(scene: "Scene", text: str) -> tuple[float, float, float]:

@@ -4,22 +4,16 @@ import time
 from argparse import Namespace
 from typing import TextIO
 
-from langflash_core.base.files import check_output_file, readable_file
+from langflash_core.base.files import check_output_file, make_folder, readable_file
 from langflash_core.errors import ImageError, InputError, WeightsError
 
 from ..renderers import open_renderer
-from ..report import ProgressBar, say_warnings, write_json
+from ..report import ProgressBar, say_warnings, tell
 from ..scenes import open_scene
-
-SUFFIXES = (".langflash", ".ply", ".glb")
 
 
 def run(args: Namespace, out: TextIO) -> None:
-    """Draw views of the scene, or take photos with poses, and carry back what the network sees in them.
-
-    Raises:
-        LangFlashError: the scene, a photo, the poses, the weights or the output cannot be used.
-    """
+    """Draw views of the scene, or take photos with poses, and carry back what the network sees in them."""
     start = time.perf_counter()
     if args.photos and not args.poses:
         raise InputError("photos need --poses, a transforms.json or a COLMAP model in the scene's world")
@@ -27,9 +21,8 @@ def run(args: Namespace, out: TextIO) -> None:
         readable_file(photo, "photo", ImageError)
     if args.weights is not None:
         readable_file(args.weights, "checkpoint", WeightsError)
-    check_output_file(args.output, SUFFIXES, inputs=[args.scene, *(args.photos or ())])
+    check_output_file(args.output, (".langflash", ".ply", ".glb"), inputs=[args.scene, *(args.photos or ())])
     scene = open_scene(args.scene, args.axes)
-    from langflash_core.base.files import make_folder
     from langflash_core.export import export
     from langflash_core.lift import lift, posed_views
 
@@ -57,8 +50,6 @@ def run(args: Namespace, out: TextIO) -> None:
         "views": lifted.num_views,
         "seconds": round(time.perf_counter() - start, 3),
     }
-    if args.json:
-        write_json(document, out)
-    else:
-        told = f"{len(lifted.gaussians):,} Gaussians in {lifted.semantics.num_atoms} groups"
-        print(f"{args.output}: {told} from {lifted.num_views} views, {document['seconds']:.1f} s", file=out)
+    told = f"{len(lifted.gaussians):,} Gaussians in {lifted.semantics.num_atoms} groups"
+    line = f"{args.output}: {told} from {lifted.num_views} views, {document['seconds']:.1f} s"
+    tell(args, document, [line], out)

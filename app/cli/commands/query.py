@@ -11,9 +11,8 @@ from langflash_core.base.request import trim_phrases
 from langflash_core.errors import InputError
 
 from ..files import checked_scene
-from ..report import ProgressBar, say_warnings, write_json
+from ..report import ProgressBar, say_warnings, tell
 from ..survey import run_survey
-from ..vocabulary import taught_by
 
 if TYPE_CHECKING:
     from langflash_core.language.relevance import Mode
@@ -22,11 +21,7 @@ if TYPE_CHECKING:
 
 def run(args: Namespace, out: TextIO) -> None:
     """Answer every phrase in one view and, with -o, write the pictures, all or none; or ask all scenes of a
-    folder.
-
-    Raises:
-        LangFlashError: the scene, a phrase, the camera or the folder cannot be used.
-    """
+    folder."""
     words = [args.scene, *args.phrases] if args.scenes and args.scene else args.phrases
     prompts = trim_phrases([*words, *([] if args.phrase_file is None else read_phrases(args.phrase_file))])
     if not prompts or not (args.scene or args.scenes):
@@ -49,9 +44,8 @@ def _one_scene(
     from langflash_core import pipeline
     from langflash_core.export.answers import answers_document
 
-    from ..cameras import chosen_camera
     from ..renderers import open_renderer
-    from ..scenes import open_scene
+    from ..scenes import chosen_camera, open_scene, taught_by
 
     choice = chosen_camera(args)
     if args.output is not None:  # lines alone need no larger picture
@@ -73,10 +67,7 @@ def _one_scene(
     document = {"scene": str(path), "view": number, "backend": renderer.backend}
     document.update(answers_document(scene, result, files))
     say_warnings(dict.fromkeys(notes))
-    if args.json:
-        write_json(document, out)
-    else:
-        print("\n".join(_line(entry, document["unit"]) for entry in document["prompts"]), file=out)
+    tell(args, document, (_line(entry, document["unit"]) for entry in document["prompts"]), out)
 
 
 def _elsewhere(
@@ -109,11 +100,7 @@ def _elsewhere(
 
 
 def _written(args: Namespace, result: "QueryResult") -> list[dict[str, str]]:
-    """The files in the folder of -o, by kind, an entry a phrase.
-
-    Raises:
-        OutputError: the folder cannot be written.
-    """
+    """The files in the folder of -o, by kind, an entry a phrase."""
     from langflash_core.base.colormaps import HeatColours
     from langflash_core.export.answers import write_answers
 

@@ -13,7 +13,7 @@ from langflash_core.errors import InputError, WeightsError
 
 from ..files import checked_photos
 from ..films import recorded, with_frames
-from ..report import INTERRUPTED, ProgressBar, say_error, say_warnings, write_json
+from ..report import INTERRUPTED, ProgressBar, say_error, say_warnings, tell
 
 if TYPE_CHECKING:
     from langflash_core.types import Scene
@@ -21,11 +21,7 @@ if TYPE_CHECKING:
 
 def run(args: Namespace, out: TextIO) -> int:
     """Check everything that can be checked, then predict, assemble, and write one file; the exit code: 0, or
-    130 where Ctrl-C ended it and what was done is kept.
-
-    Raises:
-        LangFlashError: a photo, the weights, the device or the output cannot be used.
-    """
+    130 where Ctrl-C ended it and what was done is kept."""
     start = time.perf_counter()
     args.photos = checked_photos(args.photos)
     if args.weights is not None:
@@ -55,12 +51,9 @@ def run(args: Namespace, out: TextIO) -> int:
         "seconds": round(time.perf_counter() - start, 3),
         **({"films": films} if films else {}),
     }
-    if args.json:
-        write_json(document, out)
-    else:
-        print(_sentence(args.output, scene, document), file=out)
-        if scene.record.world is not None:
-            print(world_line(scene.record.world, scene.record.metric_scale), file=out)
+    world = scene.record.world
+    standing = [] if world is None else [world_line(world, scene.record.metric_scale)]
+    tell(args, document, [_sentence(args.output, scene, document), *standing], out)
     return 0
 
 
@@ -86,7 +79,7 @@ def _written(args: Namespace, films: Sequence[dict[str, Any]]) -> "Scene":
     from langflash_core.export.cameras import read_posed
     from langflash_core.scene.file import save
 
-    fov, intrinsics, viewmats = args.fov, args.intrinsics, None
+    intrinsics, viewmats = args.intrinsics, None
     if args.poses:
         posed = read_posed(args.poses).of(args.photos).upright()
         intrinsics, viewmats = posed.intrinsics, posed.viewmats
@@ -101,7 +94,7 @@ def _written(args: Namespace, films: Sequence[dict[str, Any]]) -> "Scene":
 
         scene = pipeline.reconstruct(
             args.photos,
-            fov=fov,
+            fov=args.fov,
             intrinsics=intrinsics,
             viewmats=viewmats,
             preset=args.preset,
@@ -126,7 +119,7 @@ def _written(args: Namespace, films: Sequence[dict[str, Any]]) -> "Scene":
     return scene
 
 
-def _sentence(path: Path, scene, document: dict) -> str:
+def _sentence(path: Path, scene: "Scene", document: dict) -> str:
     return (
         f"{path}: {len(scene.gaussians):,} Gaussians in {scene.semantics.num_atoms} groups from "
         f"{scene.num_views} view{'s' * (scene.num_views > 1)}, "

@@ -1,7 +1,7 @@
 """`langflash render`: one picture of a scene."""
 
 from argparse import Namespace
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 from typing import Any, TextIO
 
 from langflash_core.base.colormaps import HeatColours
@@ -14,18 +14,13 @@ from langflash_core.export.paint import write_picture
 from langflash_core.types import Scene
 from langflash_core.writing.drawn import Look
 
-from ..cameras import chosen_camera
 from ..renderers import open_renderer
-from ..report import ProgressBar, write_json
-from ..scenes import open_scene, say_hints
+from ..report import ProgressBar, tell
+from ..scenes import chosen_camera, open_scene, say_hints
 
 
 def run(args: Namespace, out: TextIO) -> None:
-    """Draw what was asked for and write it as a PNG.
-
-    Raises:
-        LangFlashError: the scene, the camera, a phrase, the atom or the output cannot be used.
-    """
+    """Draw what was asked for and write it as a PNG."""
     picture, word, atom = args.what
     prompts = _prompts_for(picture, word, args.prompt)
     if args.fill and not picture.fills:
@@ -50,10 +45,7 @@ def run(args: Namespace, out: TextIO) -> None:
         "backend": renderer.backend,
         **more,
     }
-    if args.json:
-        write_json(document, out)
-    else:
-        print(f"{args.output}: {word}, {camera.width} x {camera.height}{_legend(more)}", file=out)
+    tell(args, document, [f"{args.output}: {word}, {camera.width} x {camera.height}", *_legend(more)], out)
 
 
 def _prompts_for(picture: Picture, word: str, given: Sequence[str] | None) -> list[str]:
@@ -78,9 +70,7 @@ def _check_atom(picture: Picture, atom: int | None, scene: Scene) -> None:
         raise InputError(f"there is no atom {atom}: this scene has {count}; {choice}")
 
 
-def _legend(more: dict[str, Any]) -> str:
-    words = [
-        " ".join([entry["prompt"], entry.get("colour", ""), "" if entry["found"] else "(not found)"]).strip()
-        for entry in more.get("prompts", ())
-    ]
-    return "".join(f"\n  {word}" for word in words)
+def _legend(more: dict[str, Any]) -> Iterator[str]:
+    for entry in more.get("prompts", ()):
+        words = entry["prompt"], entry.get("colour", ""), "" if entry["found"] else "(not found)"
+        yield f"  {' '.join(words).strip()}"

@@ -2,6 +2,7 @@
 
 import json
 from argparse import Namespace
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, TextIO
 
@@ -26,18 +27,14 @@ from langflash_core.showing.tours import (
     write_tour,
 )
 
-from ..report import write_json
+from ..report import tell
 
 FORMAT, VERSION = "langflash-tour", 1
 SUFFIX = ".langflash"
 
 
 def run(args: Namespace, out: TextIO) -> None:
-    """List, change or exchange the tour of a scene file; its Gaussians stay as they are, bit by bit.
-
-    Raises:
-        LangFlashError: the scene, a stop, a note or the output cannot be used.
-    """
+    """List, change or exchange the tour of a scene file; its Gaussians stay as they are, bit by bit."""
     readable_file(args.scene, "scene", SceneFileError)
     if args.scene.suffix.lower() != SUFFIX:
         raise InputError(f"{args.scene.name} cannot hold a tour; export it to a {SUFFIX} scene first")
@@ -49,46 +46,37 @@ def run(args: Namespace, out: TextIO) -> None:
             check_same_kind(output, ("format", "version"))
     tour, found = tour_in(args.scene)
     if args.action == "list":
-        return _list(tour, found, args.json, out)
+        document = {**told_tour(tour), "metric_scale": found.metadata.get("metric_scale")}
+        return tell(args, document, _lines(tour, found), out)
     if output is not None:
         make_folder(output.parent)
     if args.action == "export":
         content = {"format": FORMAT, "version": VERSION, **told_tour(tour)}
         write_atomically(args.output, json.dumps(content, indent=1, ensure_ascii=False).encode())
-        return print(f"{output}: {_counted(tour)}", file=out)
-    changed = _CHANGES[args.action](args, tour, found)
-    write_tour(changed, found, output or args.scene)
-    return print(f"{output or args.scene}: {_counted(changed)}", file=out)
-
-
-def _counted(tour: Tour) -> str:
+    else:
+        tour = _CHANGES[args.action](args, tour, found)
+        write_tour(tour, found, output or args.scene)
     start = f", opens at {tour.start}" if tour.start else ""
-    return f"{len(tour.stops)} stops, {len(tour.notes)} notes{start}"
-
-
-def _list(tour: Tour, found: Container, as_json: bool, out: TextIO) -> None:
-    if as_json:
-        return write_json({**told_tour(tour), "metric_scale": found.metadata.get("metric_scale")}, out)
-    for number, stop in enumerate(tour.stops, 1):
-        start = " (start)" if stop.name == tour.start else ""
-        print(f"stop {number}: {stop.name}{start}{_more(stop.text, stop.phrase)}", file=out)
-    for number, note in enumerate(tour.notes, 1):
-        place = ", ".join(f"{value:.2f}" for value in note.at)
-        length = "" if note.length is None else f", {_length(note.length, found)}"
-        print(f"note {number} at {place}{length}{_more(note.text, note.phrase)}", file=out)
-    if not tour:
-        print('no tour; begin one with: langflash tour stop SCENE "The window"', file=out)
+    print(f"{output or args.scene}: {len(tour.stops)} stops, {len(tour.notes)} notes{start}", file=out)
     return None
 
 
-def _more(text: str, phrase: str) -> str:
-    said = f": {text}" if text else ""
-    return said + (f' [asks "{phrase}"]' if phrase else "")
-
-
-def _length(length: float, found: Container) -> str:
+def _lines(tour: Tour, found: Container) -> Iterator[str]:
+    for number, stop in enumerate(tour.stops, 1):
+        start = " (start)" if stop.name == tour.start else ""
+        yield f"stop {number}: {stop.name}{start}{_more(stop)}"
     scale = found.metadata.get("metric_scale")
-    return f"{length * scale:.2f} m" if scale else f"{length:.3f} scene units"
+    for number, note in enumerate(tour.notes, 1):
+        line = f"note {number} at {', '.join(f'{value:.2f}' for value in note.at)}"
+        if note.length is not None:
+            line += f", {note.length * scale:.2f} m" if scale else f", {note.length:.3f} scene units"
+        yield line + _more(note)
+    if not tour:
+        yield 'no tour; begin one with: langflash tour stop SCENE "The window"'
+
+
+def _more(told: Stop | Note) -> str:
+    return (f": {told.text}" if told.text else "") + (f' [asks "{told.phrase}"]' if told.phrase else "")
 
 
 # What each action makes of the tour
@@ -111,17 +99,15 @@ def _with_note(args: Namespace, tour: Tour, found: Container) -> Tour:
     if args.at is None and not args.phrase:
         raise InputError('a note needs a place: say --at X,Y,Z, or --phrase "armchair" for what that finds')
     to = None if args.to is None else Vector(*args.to)
-    at = _found(args) if args.at is None else Vector(*args.at)
+    if args.at is not None:
+        at = Vector(*args.at)
+    else:
+        from ..renderers import open_renderer
+        from ..scenes import open_scene
+
+        with open_renderer(args.backend) as renderer:
+            at = place_of(open_scene(args.scene), args.phrase, renderer)
     return tour.with_note(Note(args.text or args.phrase, at, to, args.phrase))
-
-
-def _found(args: Namespace) -> Vector:
-    from ..renderers import open_renderer
-    from ..scenes import open_scene
-
-    scene = open_scene(args.scene)
-    with open_renderer(args.backend) as renderer:
-        return place_of(scene, args.phrase, renderer)
 
 
 def _without(args: Namespace, tour: Tour, found: Container) -> Tour:
@@ -149,13 +135,7 @@ def _started(args: Namespace, tour: Tour, found: Container) -> Tour:
 
 
 def _imported(args: Namespace, tour: Tour, found: Container) -> Tour:
-    return _read(args.file)
-
-
-def _read(path: Path) -> Tour:
-    """Raises:
-    InputError: missing, or no tour.
-    """
+    path: Path = args.file
     readable_file(path, "tour", InputError)
     TEXT.check(path.stat().st_size, path.name, InputError)
     try:

@@ -10,12 +10,7 @@ from ..files import out_of_folders
 
 
 def run(args: Namespace, out: TextIO) -> int:
-    """Open the window on photos, a scene, or nothing; returns when it is closed.
-
-    Raises:
-        ImageError: a path leads nowhere, or to a folder without photos.
-        GraphicsError: there is no display or no OpenGL.
-    """
+    """Open the window on photos, a scene, or nothing; returns when it is closed."""
     paths = out_of_folders(args.paths)
     for path in paths:
         readable_file(path, "photo or scene", ImageError)

@@ -3,6 +3,7 @@
 import hashlib
 import json
 from argparse import Namespace
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, TextIO
 
@@ -17,38 +18,22 @@ from langflash_core.network.checkpoints.download import download
 from langflash_core.network.checkpoints.parts import FORMAT, part_folder, read_part
 from langflash_core.network.checkpoints.store import install, verify_part
 
-from ..report import ProgressBar, say_warnings, write_json
+from ..report import ProgressBar, say_warnings, tell
 
 
 def run(args: Namespace, out: TextIO) -> None:
-    """List, verify, import or get checkpoints.
-
-    Raises:
-        WeightsError: a checkpoint is missing, damaged, or fits no network of this version.
-        DownloadError: it could not be fetched.
-    """
+    """List, verify, import or get checkpoints."""
     {"list": _list, "verify": _verify, "import": _import, "get": _get}[args.action](args, out)
 
 
 def _list(args: Namespace, out: TextIO) -> None:
     entries = [_entry(path) for path in _present()]
-    available = [
-        {
-            "name": p.name,
-            "preset": p.preset,
-            "part": p.part,
-            "about": p.about,
-            "licence": p.licence,
-            "url": p.url,
-        }
-        for p in (*CATALOGUE, *OTHERS)
-    ]
-    if args.json:
-        write_json({"weights": entries, "available": available, "folder": str(weights_folder())}, out)
-        return
+    told = ("name", "preset", "part", "about", "licence", "url")
+    available = [{name: getattr(p, name) for name in told} for p in (*CATALOGUE, *OTHERS)]
     lines = [*map(_line, entries), "", "to be had with `langflash weights get NAME`:"]
     lines += [f"  {p['name']:<24}{p['part']:<10}{p['about']}; licence: {p['licence']}" for p in available]
-    print("\n".join(lines), file=out)
+    document = {"weights": entries, "available": available, "folder": str(weights_folder())}
+    tell(args, document, lines, out)
 
 
 def _verify(args: Namespace, out: TextIO) -> None:
@@ -60,7 +45,7 @@ def _verify(args: Namespace, out: TextIO) -> None:
         else:
             load_network(entry["preset"], path)
         entry["sound"] = True
-    _say(args, out, entries)
+    tell(args, {"weights": entries}, map(_line, entries), out)
 
 
 def _import(args: Namespace, out: TextIO) -> None:
@@ -90,41 +75,28 @@ def _get(args: Namespace, out: TextIO) -> None:
 
 
 def _say_file(args: Namespace, out: TextIO, path: Path) -> None:
-    if args.json:
-        write_json({"weights": [{"path": str(path), "bytes": path.stat().st_size}]}, out)
-    else:
-        print(path, file=out)
+    document = {"weights": [{"path": str(path), "bytes": path.stat().st_size}]}
+    tell(args, document, [str(path)], out)
 
 
 def _installed(args: Namespace, out: TextIO, checkpoint: Path, output: Path | None) -> None:
     preset = PRESETS[args.preset] if "preset" in args else PRESETS[find_published(args.name).preset]
     done = install(checkpoint, preset, output, side=getattr(args, "size", None))
     part, *others = done.paths
-    _say(args, out, [_entry(part), *({"path": str(p), "bytes": p.stat().st_size} for p in others)])
+    entries = [_entry(part), *({"path": str(p), "bytes": p.stat().st_size} for p in others)]
+    tell(args, {"weights": entries}, map(_line, entries), out)
     say_warnings(done.notes)
 
 
 def _present() -> list[Path]:
     """Shipped checkpoints, then imported parts."""
-    shipped = [asset_path(f"weights/{name}.safetensors") for name in PRESETS if _is_shipped(name)]
-    return shipped + [
-        p for preset in PRESETS.values() for p in sorted(part_folder(preset).glob("*.safetensors"))
-    ]
-
-
-def _is_shipped(name: str) -> bool:
-    try:
-        asset_path(f"weights/{name}.safetensors")
-    except FileNotFoundError:
-        return False
-    return True
-
-
-def _say(args: Namespace, out: TextIO, entries: list[dict[str, Any]]) -> None:
-    if args.json:
-        write_json({"weights": entries}, out)
-    else:
-        print("\n".join(_line(entry) for entry in entries), file=out)
+    present = []
+    for name in PRESETS:
+        with suppress(FileNotFoundError):
+            present.append(asset_path(f"weights/{name}.safetensors"))
+    for preset in PRESETS.values():
+        present += sorted(part_folder(preset).glob("*.safetensors"))
+    return present
 
 
 def _entry(path: Path) -> dict[str, Any]:

@@ -2,22 +2,18 @@
 
 from argparse import Namespace
 from pathlib import Path
-from typing import TextIO
+from typing import Any, TextIO
 
 from langflash_core.base.files import check_output_file
 from langflash_core.errors import InputError, PromptError
 from langflash_core.language.lessons import SUFFIX
 
 from ..files import checked_scene
-from ..report import write_json
+from ..report import tell
 
 
 def run(args: Namespace, out: TextIO) -> None:
-    """Learn, teach or list.
-
-    Raises:
-        LangFlashError: a scene, the vocabulary or the output cannot be used.
-    """
+    """Learn, teach or list."""
     {"learn": _learn, "teach": _teach, "list": _list}[args.action](args, out)
 
 
@@ -48,10 +44,8 @@ def _learn(args: Namespace, out: TextIO) -> None:
             "dictionary, save the scene, and try again"
         )
     write_lessons(known, args.output)
-    if args.json:
-        write_json({"learned": learned, "words": len(known), "file": str(args.output)}, out)
-    else:
-        print(f"learned {learned}, {len(known)} in {args.output}", file=out)
+    document = {"learned": learned, "words": len(known), "file": str(args.output)}
+    tell(args, document, [f"learned {learned}, {len(known)} in {args.output}"], out)
 
 
 def _teach(args: Namespace, out: TextIO) -> None:
@@ -71,13 +65,9 @@ def _teach(args: Namespace, out: TextIO) -> None:
     took = lessons_taken(scene, lessons)
     save(replace(scene, record=with_lessons(scene.record, took)), args.output)
     groups = [{"group": k, "name": one.name, "denied": list(one.denied)} for k, one in sorted(took.items())]
-    if args.json:
-        write_json({"scene": str(args.output), "groups": groups}, out)
-        return
-    for group in groups:
-        said = [group["name"], *(f"not {word}" for word in group["denied"])]
-        print(f"group {group['group']}: {', '.join(filter(None, said))}", file=out)
-    print(f"{len(groups)} of {scene.semantics.num_atoms} groups took something; {args.output}", file=out)
+    lines = [f"group {group['group']}: {_said(group)}" for group in groups]
+    lines.append(f"{len(groups)} of {scene.semantics.num_atoms} groups took something; {args.output}")
+    tell(args, {"scene": str(args.output), "groups": groups}, lines, out)
 
 
 def _list(args: Namespace, out: TextIO) -> None:
@@ -86,8 +76,8 @@ def _list(args: Namespace, out: TextIO) -> None:
 
     lessons = read_lessons(Path(args.words)).lessons
     rows = [{"name": one.name, "denied": list(one.denied)} for one in lessons]
-    if args.json:
-        write_json({"words": rows}, out)
-        return
-    for row in rows:
-        print(", ".join(filter(None, [row["name"], *(f"not {word}" for word in row["denied"])])), file=out)
+    tell(args, {"words": rows}, map(_said, rows), out)
+
+
+def _said(row: dict[str, Any]) -> str:
+    return ", ".join(filter(None, [row["name"], *(f"not {word}" for word in row["denied"])]))

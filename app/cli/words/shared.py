@@ -1,7 +1,9 @@
 """What several commands are told in the same words."""
 
 import argparse
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 from langflash_core.base.detail import DEFAULT_DETAIL, DETAILS, FEWEST, MOST
 from langflash_core.base.formats import AXES, COLOUR_MAPS
@@ -30,11 +32,28 @@ def new_actions(commands, name: str, purpose: str):
     return command.add_subparsers(dest="action", metavar="ACTION", required=True)
 
 
+def add_value(
+    command: argparse._ActionsContainer,
+    said: str,
+    read: Callable[[str], Any] = str,
+    purpose: str | None = None,
+    **more: Any,
+) -> None:
+    """What takes a value, read by `read`; said as in help: "--frames N", or "scene SCENE" of a bare word."""
+    *names, metavar = said.split()
+    command.add_argument(*names, type=read, metavar=metavar, help=purpose, **more)
+
+
+def add_switch(command: argparse._ActionsContainer, name: str, purpose: str) -> None:
+    """An option without a value, off unless it is given."""
+    command.add_argument(name, action="store_true", help=purpose)
+
+
 def add_output(
-    command: argparse.ArgumentParser, metavar: str, purpose: str, *, required: bool = True
+    command: argparse.ArgumentParser, metavar: str, purpose: str, *, required: bool = True, **more: Any
 ) -> None:
     """-o, where the command writes; where it is not `required`, the command can do without."""
-    command.add_argument("-o", "--output", required=required, type=Path, metavar=metavar, help=purpose)
+    add_value(command, f"-o --output {metavar}", Path, purpose, required=required, **more)
 
 
 def add_network(command: argparse.ArgumentParser) -> None:
@@ -42,34 +61,25 @@ def add_network(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "--preset", choices=("mini", "full"), default="mini", help="which network to use (default: mini)"
     )
-    command.add_argument(
-        "--weights",
-        type=Path,
-        metavar="PATH",
-        help="use this checkpoint instead of the shipped or imported ones",
+    add_value(command, "--weights PATH", Path, "use this checkpoint instead of the shipped or imported ones")
+    add_value(
+        command,
+        "--size PX",
+        pixel_side,
+        "resize photos to about PX x PX pixels for the network (default: 224; full: 256)",
     )
-    command.add_argument(
-        "--size",
-        type=pixel_side,
-        metavar="PX",
-        help="resize photos to about PX x PX pixels for the network (default: 224; full: 256)",
-    )
+    add_device(command)
+
+
+def add_device(command: argparse.ArgumentParser) -> None:
+    """What the network runs on."""
     command.add_argument("--device", choices=("auto", "cpu", "cuda"), default="auto")
 
 
 def add_film_part(command: argparse.ArgumentParser) -> None:
     """Which part of a film counts."""
-    command.add_argument(
-        "--from",
-        dest="start",
-        type=film_time,
-        default=0.0,
-        metavar="S",
-        help="start at this second of the film",
-    )
-    command.add_argument(
-        "--to", dest="end", type=film_time, metavar="S", help="stop at this second of the film"
-    )
+    add_value(command, "--from S", film_time, "start at this second of the film", dest="start", default=0.0)
+    add_value(command, "--to S", film_time, "stop at this second of the film", dest="end")
 
 
 def add_detail(command: argparse.ArgumentParser) -> None:
@@ -81,11 +91,11 @@ def add_detail(command: argparse.ArgumentParser) -> None:
         help="how fine the scene is: normal makes about 240,000 Gaussians from two photos, high 1.6 times as "
         f"many, low a third; preset mini only (default: {DEFAULT_DETAIL})",
     )
-    command.add_argument(
-        "--gaussians",
-        type=gaussian_count,
-        metavar="N",
-        help=f"make about N Gaussians, {FEWEST:,} to {MOST:,}, instead of what --detail says",
+    add_value(
+        command,
+        "--gaussians N",
+        gaussian_count,
+        f"make about N Gaussians, {FEWEST:,} to {MOST:,}, instead of what --detail says",
     )
 
 
@@ -97,29 +107,20 @@ def add_colours(command: argparse.ArgumentParser) -> None:
         default=COLOUR_MAPS[0],
         help=f"colours of heat-maps (default: {COLOUR_MAPS[0]}, readable for colour-blind eyes)",
     )
-    command.add_argument(
-        "--span", type=span, metavar="LOW,HIGH", help="relevance that the first and the last colour stand for"
-    )
+    add_value(command, "--span LOW,HIGH", span, "relevance that the first and the last colour stand for")
+
+
+def add_place(command: argparse.ArgumentParser, described: str) -> None:
+    """From where; described: what is said of the camera's file."""
+    place = command.add_mutually_exclusive_group()
+    add_value(place, "--view N", photo_index, "look from this photo, counted from 1 (default: 1)")
+    add_value(place, "--camera FILE", Path, f"look from this camera{described}")
 
 
 def add_camera(command: argparse.ArgumentParser) -> None:
     """From where, and how large."""
-    camera = command.add_mutually_exclusive_group()
-    camera.add_argument(
-        "--view", type=photo_index, metavar="N", help="look from this photo, counted from 1 (default: 1)"
-    )
-    camera.add_argument(
-        "--camera",
-        type=Path,
-        metavar="FILE",
-        help="look from this camera: JSON with viewmat (4 x 4), K (3 x 3), width and height",
-    )
-    command.add_argument(
-        "--size",
-        type=size,
-        metavar="WxH",
-        help="size in pixels (default: that of the photo in the scene)",
-    )
+    add_place(command, ": JSON with viewmat (4 x 4), K (3 x 3), width and height")
+    add_value(command, "--size WxH", size, "size in pixels (default: that of the photo in the scene)")
     command.add_argument(
         "--ortho",
         action="store_const",
@@ -130,10 +131,8 @@ def add_camera(command: argparse.ArgumentParser) -> None:
 
 def add_shown(command: argparse.ArgumentParser) -> None:
     """What a picture does where the scene knows little."""
-    command.add_argument("--fade", action="store_true", help="fade out what no photo saw from near this view")
-    command.add_argument(
-        "--fill", action="store_true", help="fill gaps from what is around them, as the window does"
-    )
+    add_switch(command, "--fade", "fade out what no photo saw from near this view")
+    add_switch(command, "--fill", "fill gaps from what is around them, as the window does")
 
 
 def add_backend(command: argparse.ArgumentParser) -> None:
@@ -161,20 +160,11 @@ def add_axes(command: argparse.ArgumentParser, written: bool = False) -> None:
 
 def add_json(command: argparse.ArgumentParser) -> None:
     """One document for programs instead of lines for people."""
-    command.add_argument("--json", action="store_true", help="print one JSON document and nothing else")
+    add_switch(command, "--json", "print one JSON document and nothing else")
 
 
 def add_description(command: argparse.ArgumentParser) -> None:
     """What a folder of photos may not say of itself."""
-    command.add_argument(
-        "--crop",
-        type=crop,
-        metavar="LEFT,TOP,RIGHT,BOTTOM",
-        help="part of every photo that counts, in pixels",
-    )
-    command.add_argument(
-        "--intrinsics", type=intrinsics, metavar="FX,FY,CX,CY", help="in pixels of the photos before the crop"
-    )
-    command.add_argument(
-        "--depth-unit", type=above_zero, metavar="METRES", help="a step of the depth maps (16 bits: 0.001)"
-    )
+    add_value(command, "--crop LEFT,TOP,RIGHT,BOTTOM", crop, "part of every photo that counts, in pixels")
+    add_value(command, "--intrinsics FX,FY,CX,CY", intrinsics, "in pixels of the photos before the crop")
+    add_value(command, "--depth-unit METRES", above_zero, "a step of the depth maps (16 bits: 0.001)")

@@ -11,8 +11,8 @@ from langflash_core.base.graphics import set_uniforms
 from ..blend import add_maps
 from ..buffers import Growing
 from ..carried import bytes_of
+from ..layered import Prepared
 from ..layout import ATOMS_A_LAYER, ATOMS_A_PASS, LAYERS_A_PASS, num_layers
-from ..level import Prepared
 from ..painter import Painter
 from ..splats import SplatBuffers
 from ..targets import PREMULTIPLIED, Layers, LayerTarget, drawing

@@ -9,10 +9,9 @@ answers.py do the same without the maps leaving it.
 
 import numpy as np
 
-from langflash_core.language.relevance import CompiledQuery
 from langflash_core.language.settings import RELEVANCE
 
-from ..answers import Answers, in_numbers, temperature_of
+from ..answers import Answers
 from ..layout import ATOMS_A_LAYER, PHRASES_A_LAYER
 from ..targets import NUMPY_TYPES, LayerTarget
 from ..weights import Maps
@@ -27,40 +26,28 @@ class HostAnswers(Answers):
     negatives), relevance (per prompts). Pixels lie along the second axis: (n, H W).
     """
 
+    _version = 0  # of the maps
     _maps: np.ndarray  # (Ka, H W)
     _inverse_norms: np.ndarray  # (H W,), 0 where empty
     _worst: np.ndarray  # (H W,), infinite where empty
 
-    def answer(self, compiled: CompiledQuery, maps: Maps, into: LayerTarget) -> None:
-        factor, prompts, negatives = in_numbers(compiled, maps.atoms)
-        temperature = temperature_of(compiled)
-        dictionary = (maps.version, factor.tobytes())
-        if self.stale("read", maps.version):
-            self._maps = read_maps(maps)
-        if self.stale("norm", dictionary):
-            self._inverse_norms = inverse_norms(self._maps, factor)
-            self.painter.passes["norm"] += 1
-        if self.stale("scales", dictionary, negatives.tobytes()):
-            self._worst = self._largest(factor @ negatives.T)
-            self.painter.passes["negatives"] += 1
-        if self.stale("prompts", dictionary, negatives.tobytes(), into, temperature, prompts.tobytes()):
-            self._write(factor @ prompts.T, temperature, into)
-            self.painter.passes["query"] += 1
+    def measure(self, maps: Maps, factor: np.ndarray) -> None:
+        if maps.version != self._version:
+            self._maps, self._version = read_maps(maps), maps.version
+        self._inverse_norms = inverse_norms(self._maps, factor)
 
-    def _largest(self, dots: np.ndarray) -> np.ndarray:
-        """Largest cosine of the negatives (Ka, M); of none where M = 0."""
-        worst = np.full(self._maps.shape[1], -1.0, np.float32)
+    def scale(self, maps: Maps, dots: np.ndarray) -> None:
+        self._worst = np.full(self._maps.shape[1], -1.0, np.float32)
         for column in dots.T:
-            np.maximum(worst, self._cosine(column), out=worst)
-        worst[self._inverse_norms == 0] = np.inf
-        return worst
+            np.maximum(self._worst, self._cosine(column), out=self._worst)
+        self._worst[self._inverse_norms == 0] = np.inf
 
     def _cosine(self, column: np.ndarray) -> np.ndarray:
         cosine = column.astype(np.float32) @ self._maps
         cosine *= self._inverse_norms
         return np.clip(cosine, -1, 1, out=cosine)
 
-    def _write(self, dots: np.ndarray, temperature: float, into: LayerTarget) -> None:
+    def compare(self, maps: Maps, dots: np.ndarray, temperature: float, into: LayerTarget) -> None:
         width, height, _ = into.array.size
         for group in range(into.num_layers):
             texels = np.zeros((width * height, PHRASES_A_LAYER), np.float32)
@@ -70,6 +57,10 @@ class HostAnswers(Answers):
                     value = relevancy(value, self._worst, temperature)
                 texels[:, place] = value
             into.array.write(texels, viewport=(0, 0, group, width, height, 1))
+
+    def forget(self) -> None:
+        super().forget()
+        self._version = 0
 
 
 def read_maps(maps: Maps) -> np.ndarray:

@@ -35,27 +35,26 @@ class Footprints:
             return np.stack((x - wide, y - tall, x + wide, y + tall))
 
 
-class Sprites:
-    """As `Shapes`: sprites, where none that reaches the image is too large for one, else quads.
+class Sprites(Quads):
+    """Sprites, where none that reaches the image is too large for one, else quads.
 
     `footprints`: of the Gaussians that were projected last; None before they are.
     """
 
     def __init__(self, ctx: moderngl.Context):
+        super().__init__(ctx)
         self.footprints: Footprints | None = None
         self.small = False
-        self._ctx = ctx
-        self._quads = Quads(ctx)
         self._largest = min(2 * _MARGIN, ctx.info["GL_POINT_SIZE_RANGE"][1])
         self._widest_view = min(ctx.info["GL_MAX_VIEWPORT_DIMS"])
 
     @property
     def defines(self) -> dict[str, float]:
-        return {"MARGIN": _MARGIN} if self.small else self._quads.defines
+        return {"MARGIN": _MARGIN} if self.small else super().defines
 
     @property
     def each(self) -> Literal["/i", "/v"]:
-        return "/v" if self.small else self._quads.each
+        return "/v" if self.small else super().each
 
     def forget(self) -> None:
         self.footprints = None
@@ -73,10 +72,10 @@ class Sprites:
 
     def render(self, vao: moderngl.VertexArray, count: int, first: int = 0) -> None:
         if self.small:
-            with _as_sprites(self._ctx, int(_MARGIN)):
+            with _as_sprites(self.ctx, int(_MARGIN)):
                 vao.render(moderngl.POINTS, vertices=count, first=first)
         else:
-            self._quads.render(vao, count, first)
+            super().render(vao, count, first)
 
 
 @contextmanager

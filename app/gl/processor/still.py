@@ -31,10 +31,11 @@ from langflash_core.splat.projection import (
     view_colours,
 )
 from langflash_core.splat.tiles import rasterize_tiles
-from langflash_core.types import LUMA, Camera, Frame, Gaussians, Scene, Semantics
+from langflash_core.types import LUMA, Camera, Frame, Gaussians, Scene
 
 from ..answers import in_numbers, temperature_of
 from ..splats import TINTED, TINTS
+from ..targets import mean_depths
 from .host import relevancy
 
 _PIXELS_AT_ONCE = 1 << 13  # 1.3 MB of 40 weights: within a core's cache
@@ -89,7 +90,7 @@ class StillMaps:
 
     def _relevance(self, compiled: CompiledQuery) -> np.ndarray:
         """As `relevance_maps`, by W (R t) in float32: the vectors W R are formed for their norms alone."""
-        factor, prompts, negatives = in_numbers(compiled, np.arange(self.weights.shape[-1]))
+        factor, prompts, negatives = in_numbers(compiled)
         inverse = self._kept(("norms", factor.tobytes()), lambda: self._inverse_norms(factor))
         cosines = self._products(factor @ np.concatenate((prompts, negatives)).T)  # (P + M, H W)
         cosines *= inverse
@@ -141,11 +142,9 @@ class Still:
     @cached_property
     def frame(self) -> Frame:
         """The picture over black as tensors, without its weight maps."""
-        sums, alphas = np.moveaxis(self.depth, -1, 0)
-        covered = alphas >= ALPHA_MIN
-        depths = np.where(covered, sums / np.where(covered, alphas, 1.0), 0.0).astype(np.float32)
         rgb = torch.from_numpy(self.colour[..., :3].astype(np.float32))
-        return Frame(rgb, torch.from_numpy(alphas.copy()), torch.from_numpy(depths), None)
+        depths = torch.from_numpy(mean_depths(self.depth, ALPHA_MIN))
+        return Frame(rgb, torch.from_numpy(self.depth[..., 1].copy()), depths, None)
 
 
 def mixture(still: Still, columns: np.ndarray) -> np.ndarray:
@@ -243,7 +242,9 @@ class _Order:
         depths = torch.zeros(len(gaussians)).index_copy(0, footprints.ids, footprints.depths.float())
         features = [torch.cat((colours, depths[:, None]), -1)]
         if self.weight_maps:
-            features.append(_sparse_in_half(self.scene.semantics.rows(kept)))
+            semantics = self.scene.semantics.rows(kept)
+            half = semantics.weight_values.detach().half()  # before they are dense: no copy in full
+            features.append(replace(semantics, weight_values=half).dense_weights())
             self._go_on()
         maps, alphas = rasterize_tiles(
             footprints, features, self.camera, threads=self.threads, stopping=self.stopping
@@ -292,12 +293,6 @@ def _footprints(gaussians: Gaussians, camera: Camera, go_on: Callable[[], None])
     )
     dropped = sum(part.num_dropped for part in parts)
     return Footprints(ids[order], centres, roots, opacities, depths[order], dropped)
-
-
-def _sparse_in_half(semantics: Semantics) -> Tensor:
-    """`dense_weights` in half precision, made without a copy in full."""
-    values = semantics.weight_values.detach().half()
-    return replace(semantics, weight_values=values).dense_weights()
 
 
 def _middle(depths: Tensor) -> tuple[float, float] | None:

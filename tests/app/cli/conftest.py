@@ -2,6 +2,8 @@
 
 import io
 import json
+import subprocess
+import sys
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -41,6 +43,44 @@ def run(capsys):
         return Outcome(code, captured.out, captured.err)
 
     return command
+
+
+@pytest.fixture
+def done(run):
+    """As `run`, of a command that must come to its end."""
+
+    def command(*words) -> Outcome:
+        outcome = run(*words)
+        assert outcome.code == 0, outcome.err
+        return outcome
+
+    return command
+
+
+@pytest.fixture
+def refused(run, tmp_path):
+    """Run a command that must be refused, by one sentence, with nothing written; returns the sentence."""
+
+    def command(*words, warned: bool = False) -> str:
+        before = _content(tmp_path)
+        outcome = run(*words)
+        assert outcome.code == 2 and outcome.out == "", outcome
+        said = [line for line in outcome.err.splitlines() if not (warned and line.startswith("warning: "))]
+        assert len(said) == 1 and said[0].startswith("langflash: ") and outcome.err.endswith("\n"), said
+        assert _content(tmp_path) == before
+        return outcome.err
+
+    return command
+
+
+def shell(*words, **how) -> subprocess.CompletedProcess[str]:
+    """A command in a process of its own."""
+    program = [sys.executable, "-m", "langflash_core", *map(str, words)]
+    return subprocess.run(program, capture_output=True, text=True, timeout=60, **how)
+
+
+def _content(folder: Path) -> dict[Path, bytes]:
+    return {path: path.read_bytes() if path.is_file() else b"" for path in folder.rglob("*")}
 
 
 def pixels(path: Path) -> np.ndarray:

@@ -35,17 +35,14 @@ def scene(photos, tmp_path_factory):
     return path
 
 
-def test_a_photo_taken_again_stands_where_it_stood(run, scene, photos, tmp_path):
+def test_a_photo_taken_again_stands_where_it_stood(done, scene, photos, tmp_path):
     output = tmp_path / "more.langflash"
-    outcome = run("add", scene, photos / "1.jpg", "-o", output)
-    assert outcome.code == 0, outcome.err
+    outcome = done("add", scene, photos / "1.jpg", "-o", output)
     assert "1 photo more, 3 in all" in outcome.out
     before, after = load(scene), load(output)
     assert after.record.photos == ("left.jpg", "right.jpg", "1.jpg") and len(after.photos) == 3
     assert (after.view_size, after.record.detail["level"]) == (before.view_size, "low")
-    assert torch.allclose(
-        after.Ks[2], after.Ks[1], rtol=0.02
-    )  # in pixels of one size, the lens assumed alike
+    assert torch.allclose(after.Ks[2], after.Ks[1], rtol=0.02)  # pixels of one size, the lens assumed alike
     count = len(before.gaussians)
     assert torch.equal(after.gaussians.means[:count], before.gaussians.means)
     assert 1.2 * count < len(after.gaussians) < 1.8 * count  # a layer like the other two
@@ -53,27 +50,23 @@ def test_a_photo_taken_again_stands_where_it_stood(run, scene, photos, tmp_path)
     # place along the rays of two photos is known from the layer's depths, right to a hundredth.
     moved = after.viewmats[2] - after.viewmats[1]
     assert float(moved[:3, :3].abs().max()) < 0.005 and float(moved[:3, 3].abs().max()) < 0.01
-    with Image.open(io.BytesIO(after.photos[2])) as picture:
-        ours = np.asarray(picture.convert("L").resize((64, 48)), float)
-    with Image.open(io.BytesIO(after.photos[1])) as picture:
-        theirs = np.asarray(picture.convert("L").resize((64, 48)), float)
+    ours, theirs = (
+        np.asarray(Image.open(io.BytesIO(photo)).convert("L").resize((64, 48)), float)
+        for photo in (after.photos[2], after.photos[1])
+    )
     assert np.abs(ours - theirs).mean() < 3  # JPEG's noise
 
 
-def test_a_photo_of_another_place_is_refused(run, scene, tmp_path):
-    output = tmp_path / "more.langflash"
-    outcome = run("add", scene, asset_path("photos/aloe_left.jpg"), "-o", output)
-    assert outcome.code == 2 and not output.exists()
-    assert "aloe_left.jpg could not be placed beside the scene's photos; take one" in outcome.err
+def test_a_photo_of_another_place_is_refused(refused, scene, tmp_path):
+    said = refused("add", scene, asset_path("photos/aloe_left.jpg"), "-o", tmp_path / "more.langflash")
+    assert "aloe_left.jpg could not be placed beside the scene's photos; take one" in said
 
 
-def test_a_scene_without_layers_is_refused_with_a_remedy(run, photos, tmp_path):
-    path, output = tmp_path / "plain.langflash", tmp_path / "more.langflash"
-    save(stripes(), path)
-    outcome = run("add", path, photos / "1.jpg", "-o", output)
-    assert outcome.code == 2 and not output.exists()
-    assert "keeps no layer and picture of each photo, as those" in outcome.err
-    assert "; reconstruct it again with all photos" in outcome.err
+def test_a_scene_without_layers_is_refused_with_a_remedy(refused, photos, tmp_path):
+    save(stripes(), tmp_path / "plain.langflash")
+    said = refused("add", tmp_path / "plain.langflash", photos / "1.jpg", "-o", tmp_path / "more.langflash")
+    assert "keeps no layer and picture of each photo, as those" in said
+    assert "; reconstruct it again with all photos" in said
 
 
 def test_a_scene_is_not_written_over_by_what_was_added_to_it(run, scene, photos):

@@ -116,17 +116,17 @@ def test_answers_are_those_of_query(made, run, tmp_path):
         assert (output / "desk" / "answers" / path.name).read_bytes() == path.read_bytes()
 
 
-def test_exports_are_those_of_export(made, run, tmp_path):
+def test_exports_are_those_of_export(made, run, done, tmp_path):
     output, *_ = made
     scene = output / "desk" / "scene.langflash"
     run("export", scene, "-o", tmp_path / "scene.ply")
     words = ("--prompt", "plant", "submarine", "--all-views", "--backend", "torch")
-    assert run("export", scene, "-o", tmp_path / "scene.csv", *words).code == 0
+    done("export", scene, "-o", tmp_path / "scene.csv", *words)
     for name in ("scene.ply", "scene.csv"):
         assert (output / "desk" / name).read_bytes() == (tmp_path / name).read_bytes()
 
 
-def test_nothing_is_done_twice(made, sets, run):
+def test_nothing_is_done_twice(made, sets, done):
     """A table of the good sets by other paths: names, sizes and times of their photos are the same."""
     output, *_ = made
     table = sets.parent / "good.csv"
@@ -136,8 +136,8 @@ def test_nothing_is_done_twice(made, sets, run):
     table.write_text("".join(f"{name},{','.join(photos)}\n" for name, photos in pairs))
     folders = [output / "desk", output / "living room"]
     before = [written(folder) for folder in folders]
-    outcome = run("batch", table, "-o", output, *ASKED, *SMALL, "--json")
-    assert outcome.code == 0 and outcome.err == ""
+    outcome = done("batch", table, "-o", output, *ASKED, *SMALL, "--json")
+    assert outcome.err == ""
     document = outcome.json()
     assert (document["sets"], document["done"], document["failed"], document["done_before"]) == (2, 2, 0, 2)
     assert [written(folder) for folder in folders] == before

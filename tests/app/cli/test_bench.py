@@ -6,12 +6,11 @@ import json
 import pytest
 
 from app.bench.modes import AXES
-from app.cli.words.judging import BENCH_AXES
+from app.cli.words.showing import BENCH_AXES
 from app.gl import offscreen_context
 from langflash_core.errors import GraphicsError
 from langflash_core.scene.file import save
 from tests.app.cli.conftest import stripes
-from tests.app.cli.test_bad_input import refused  # noqa: F401
 
 SMALL = ("--frames", "1", "--size", "28x21", "--only", "precision")
 
@@ -28,10 +27,9 @@ def test_the_parser_knows_the_axes():
     assert BENCH_AXES == AXES
 
 
-def test_measures_a_scene_and_writes_two_files(run, scene_file, tmp_path):
+def test_measures_a_scene_and_writes_two_files(done, scene_file, tmp_path):
     folder = tmp_path / "out" / "bench"
-    outcome = run("bench", scene_file, "--prompt", "armchair", *SMALL, "-o", folder)
-    assert outcome.code == 0, outcome
+    outcome = done("bench", scene_file, "--prompt", "armchair", *SMALL, "-o", folder)
     assert "float32" in outcome.out and "armchair" in outcome.out and "2,352 Gaussians" in outcome.out
     assert {path.name for path in folder.iterdir()} == {"bench.json", "bench.csv"}
     document = json.loads((folder / "bench.json").read_text())
@@ -55,7 +53,7 @@ def test_the_papers_cases_at_a_chosen_size(run):
     assert all(case["scene"]["atoms"] == 128 for case in document["cases"])
 
 
-def test_bad_input(refused, scene_file, tmp_path):  # noqa: F811
+def test_bad_input(refused, scene_file, tmp_path):
     assert "--synthetic" in refused("bench")
     assert "leave the scene file out" in refused("bench", scene_file, "--paper")
     assert "--spread" in refused("bench", scene_file, "--spread", "2")
@@ -70,13 +68,13 @@ def test_bad_input(refused, scene_file, tmp_path):  # noqa: F811
     assert "at most 16" in refused("bench", scene_file, "--prompt", *["chair"] * 17)
 
 
-def test_the_output_is_no_file(refused, scene_file, tmp_path_factory):  # noqa: F811
+def test_the_output_is_no_file(refused, scene_file, tmp_path_factory):
     taken = tmp_path_factory.mktemp("taken") / "file"
     taken.write_text("")
     assert "it is a file" in refused("bench", scene_file, "-o", taken)
 
 
-def test_a_scene_without_atoms_needs_some(run, refused, tmp_path_factory):  # noqa: F811
+def test_a_scene_without_atoms_needs_some(run, refused, tmp_path_factory):
     import dataclasses
 
     scene = stripes()

@@ -14,7 +14,6 @@ from PIL import Image
 import langflash_core
 from langflash_core import pipeline
 from tests.app.cli.conftest import HEIGHT, WIDTH, stripes
-from tests.app.cli.test_bad_input import refused  # noqa: F401
 
 ASKED = ("--what", "boxes", "--prompt", "armchair", "submarine", "--backend", "torch")
 
@@ -57,10 +56,9 @@ def test_boxes_are_measured_in_a_view_as_large_as_its_photo(run, tmp_path, monke
     assert sizes == [(2 * WIDTH, 2 * HEIGHT), (28, 21)]
 
 
-def test_every_photo_has_its_boxes(run, scene_file, tmp_path):
+def test_every_photo_has_its_boxes(run, done, scene_file, tmp_path):
     words = ("--what", "boxes", "--prompt", "armchair", "--all-views", "--backend", "torch")
-    outcome = run("export", scene_file, *words, "-o", tmp_path / "a.glb")
-    assert outcome.code == 0, outcome
+    done("export", scene_file, *words, "-o", tmp_path / "a.glb")
     views = json.loads(run("info", scene_file, "--json").out)["views"]
     assert len(trimesh.load_scene(tmp_path / "a.glb").geometry) == views
 
@@ -73,12 +71,12 @@ def test_every_photo_has_its_boxes(run, scene_file, tmp_path):
         ("a.png", ("--what", "boxes", "--prompt", "armchair"), ".json or .csv or .glb"),
     ],
 )
-def test_what_cannot_be(refused, scene_file, tmp_path, name, words, hint):  # noqa: F811
+def test_what_cannot_be(refused, scene_file, tmp_path, name, words, hint):
     assert hint in refused("export", scene_file, *words, "-o", tmp_path / name)
 
 
 @pytest.mark.parametrize("words", [("--prompt", "armchair"), ("--what", "boxes", "--prompt", "armchair")])
-def test_a_json_of_another_kind_is_not_replaced(run, scene_file, tmp_path, words):
+def test_a_json_of_another_kind_is_not_replaced(run, done, scene_file, tmp_path, words):
     camera = tmp_path / "camera.json"
     command = ("export", scene_file, "-o", camera, *words, "--backend", "torch")
     for other in ('{"viewmat": []}', '["a"]', "no JSON"):
@@ -86,11 +84,11 @@ def test_a_json_of_another_kind_is_not_replaced(run, scene_file, tmp_path, words
         outcome = run(*command)
         assert outcome.code == 2 and "--replace" in outcome.err, outcome
         assert outcome.err.count("\n") == 1 and camera.read_text() == other
-    assert run(*command, "--replace").code == 0
-    assert run(*command).code == 0  # its own kind
+    done(*command, "--replace")
+    done(*command)  # its own kind
 
 
-def test_one_view_after_the_other_is_in_memory(run, scene_file, tmp_path, monkeypatch):
+def test_one_view_after_the_other_is_in_memory(done, scene_file, tmp_path, monkeypatch):
     query, alive = pipeline.query, []
 
     def watched(*args, **options):
@@ -108,5 +106,5 @@ def test_one_view_after_the_other_is_in_memory(run, scene_file, tmp_path, monkey
     asked = ("--prompt", "armchair", "--backend", "torch")
     for words in (("a.json",), ("b.csv", "--all-views"), ("c.png", "--what", "labels", "--all-views")):
         alive.clear()
-        outcome = run("export", many, "-o", tmp_path / words[0], *words[1:], *asked)
-        assert outcome.code == 0 and len(alive) == 4, outcome
+        done("export", many, "-o", tmp_path / words[0], *words[1:], *asked)
+        assert len(alive) == 4

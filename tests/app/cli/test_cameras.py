@@ -8,7 +8,7 @@ import pytest
 import torch
 from PIL import Image
 
-from app.cli.cameras import chosen_camera
+from app.cli.scenes import chosen_camera
 from langflash_core.errors import ViewError
 from langflash_core.writing.cameras import read_camera
 from tests.app.cli.conftest import HEIGHT, WIDTH, stripes

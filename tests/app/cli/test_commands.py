@@ -24,18 +24,17 @@ from langflash_core.errors import ImageError
 from langflash_core.scene.file import load, save
 from langflash_core.splat import render
 from langflash_core.types import Camera
-from tests.app.cli.conftest import HEIGHT, WIDTH, WORDS, pixels, stripes
+from tests.app.cli.conftest import HEIGHT, WIDTH, WORDS, pixels, shell, stripes
 
 TORCH = ("--backend", "torch")
 
 
 @pytest.mark.parametrize("backend", ["torch", "gl"])
-def test_query(run, scene_file, tmp_path, backend):
+def test_query(done, scene_file, tmp_path, backend):
     out = tmp_path / "deep" / "out"
-    outcome = run(
+    outcome = done(
         "query", scene_file, "armchair", "submarine", "-o", out, "--json", "--npz", "--backend", backend
     )
-    assert outcome.code == 0, outcome.err
     document = outcome.json()
     assert document["backend"] == backend and document["view"] == 1 and document["mode"] == "relevancy"
     assert document["size"] == [WIDTH, HEIGHT] and document["unit"] == "scene"
@@ -55,34 +54,19 @@ def test_query(run, scene_file, tmp_path, backend):
     assert pixels(out / "armchair_mask.png")[:, : WIDTH // 4].mean() > 200
     assert pixels(out / "submarine_mask.png").max() == 0
     arrays = np.load(chair["files"]["npz"])
-    kinds = {name: (arrays[name].shape, str(arrays[name].dtype)) for name in arrays}
-    assert (
-        kinds.items()
-        >= {
-            "relevance": ((2, HEIGHT, WIDTH), "float32"),
-            "mask": ((2, HEIGHT, WIDTH), "bool"),
-            "depth": ((HEIGHT, WIDTH), "float32"),
-            "rgb": ((HEIGHT, WIDTH, 3), "uint8"),
-        }.items()
-    )
+    size = (HEIGHT, WIDTH)
+    kinds = {"relevance": (2, *size), "mask": (2, *size), "depth": size, "rgb": (*size, 3)}
+    assert {name: arrays[name].shape for name in kinds} == kinds
+    types = [str(arrays[name].dtype) for name in kinds]
+    assert types == ["float32", "bool", "float32", "uint8"]
     assert np.array_equal(arrays["mask"][0] * 255, pixels(out / "armchair_mask.png"))
 
 
 def test_backends_agree(run, scene_file, tmp_path):
     arrays = {}
     for backend in ("torch", "gl"):
-        run(
-            "query",
-            scene_file,
-            *WORDS,
-            "-o",
-            tmp_path / backend,
-            "--npz",
-            "--backend",
-            backend,
-            "--view",
-            "2",
-        )
+        words = ("--npz", "--view", "2", "--backend", backend)
+        run("query", scene_file, *WORDS, "-o", tmp_path / backend, *words)
         arrays[backend] = np.load(tmp_path / backend / "query.npz")
     exact, drawn = arrays["torch"], arrays["gl"]
     # The project's own promise: relevance within 0.005 on average, colours within 45 dB.
@@ -116,14 +100,13 @@ def test_what_another_photo_shows_is_said(run, tmp_path):
     assert "photo 2" not in run("query", path, "armchair", "--view", 1, *TORCH).err  # asked of that one
 
 
-def test_query_without_a_folder_writes_nothing(run, scene_file, tmp_path, monkeypatch):
+def test_query_without_a_folder_writes_nothing(run, done, scene_file, tmp_path, monkeypatch):
     """The same numbers as with one, without the file at the end of the line."""
     kept = run("query", scene_file, "armchair", "submarine", "-o", tmp_path / "out", *TORCH)
     (tmp_path / "here").mkdir()
     monkeypatch.chdir(tmp_path / "here")
     beside = set(os.listdir(scene_file.parent))
-    outcome = run("query", scene_file, "armchair", "submarine", *TORCH)
-    assert outcome.code == 0, outcome.err
+    outcome = done("query", scene_file, "armchair", "submarine", *TORCH)
     assert outcome.out.splitlines() == [line.partition("  -> ")[0] for line in kept.out.splitlines()]
     assert outcome.out.startswith("found") and "% of the picture, at (" in outcome.out
     document = run("query", scene_file, "armchair", "--json", *TORCH).json()
@@ -134,7 +117,7 @@ def test_query_without_a_folder_writes_nothing(run, scene_file, tmp_path, monkey
     assert not os.listdir() and set(os.listdir(scene_file.parent)) == beside
 
 
-def test_what_a_phrase_may_not_mean_is_said(run, scene_file, tmp_path):
+def test_what_a_phrase_may_not_mean_is_said(run, done, scene_file, tmp_path):
     """On stderr and in the document, of whatever is asked; what it proposes takes the denied thing away."""
     words = ("no armchair", "armchiar", "wall - armchair")
     document = run("query", scene_file, *words, "-o", tmp_path / "out", "--json", *TORCH)
@@ -144,24 +127,15 @@ def test_what_a_phrase_may_not_mean_is_said(run, scene_file, tmp_path):
     assert minus["score"] < negated["score"]
     said = [f"warning: {entry['note']}" for entry in (negated, slip)]
     assert document.err.splitlines() == said
+    heat = ("--what", "relevance", "--prompt", "no armchair")
     for command in (
         ("export", scene_file, "-o", tmp_path / "a.ply", "--prompt", "no armchair"),
         ("hide", scene_file, "no armchair", "-o", tmp_path / "hidden.langflash", *TORCH),
-        (
-            "render",
-            scene_file,
-            "--what",
-            "relevance",
-            "--prompt",
-            "no armchair",
-            "-o",
-            tmp_path / "a.png",
-            *TORCH,
-        ),
+        ("render", scene_file, *heat, "-o", tmp_path / "a.png", *TORCH),
         ("query", "--scenes", scene_file.parent, "no armchair", "-o", tmp_path / "survey", *TORCH),
     ):
-        outcome = run(*command)
-        assert outcome.code == 0 and said[0] in outcome.err.splitlines(), (command, outcome.err)
+        outcome = done(*command)
+        assert said[0] in outcome.err.splitlines(), (command, outcome.err)
 
 
 def test_query_tells_how_it_reads_a_phrase(run, scene_file, tmp_path):
@@ -183,56 +157,50 @@ def test_query_by_cosine_with_own_negatives(run, scene_file, tmp_path):
     cosine = run("query", scene_file, "armchair", "-o", tmp_path, "--mode", "cosine", "--json", *TORCH).json()
     assert cosine["mode"] == "cosine"
     assert cosine["prompts"][0]["score"] == pytest.approx(1.0, abs=1e-3)  # the atom is that very phrase
-    scores = [
-        run("query", scene_file, "armchair", "-o", tmp_path, "--json", *TORCH, "--negatives", word).json()[
-            "prompts"
-        ][0]["score"]
-        for word in ("sofa", "moon")
-    ]
-    assert scores[0] < scores[1]  # a close rival leaves less
+    asked = ("query", scene_file, "armchair", "-o", tmp_path, "--json", *TORCH, "--negatives")
+    close, far = (run(*asked, word).json()["prompts"][0]["score"] for word in ("sofa", "moon"))
+    assert close < far  # a close rival leaves less
 
 
-def test_size_and_camera_file(run, scene_file, tmp_path):
+def test_size_and_camera_file(done, scene_file, tmp_path):
     camera = tmp_path / "camera.json"
     viewmat = np.eye(4).tolist()
     viewmat[2][3] = 0.5  # half a unit back
     K = [[35.0, 0.0, 28.0], [0.0, 35.0, 21.0], [0.0, 0.0, 1.0]]
     camera.write_text(json.dumps({"viewmat": viewmat, "K": K, "width": 56, "height": 42}))
     near, far = tmp_path / "near.png", tmp_path / "far.png"
-    assert run("render", scene_file, "-o", near, "--size", "80x60", *TORCH).code == 0
-    assert run("render", scene_file, "-o", far, "--camera", camera, "--size", "80x60", *TORCH).code == 0
+    done("render", scene_file, "-o", near, "--size", "80x60", *TORCH)
+    done("render", scene_file, "-o", far, "--camera", camera, "--size", "80x60", *TORCH)
     assert pixels(near).shape == pixels(far).shape == (60, 80, 3)
     assert (pixels(far).sum(-1) > 0).mean() < (pixels(near).sum(-1) > 0).mean()  # smaller from further away
 
 
-def test_pictures_have_the_size_of_the_photos(run, tmp_path):
+def test_pictures_have_the_size_of_the_photos(run, done, tmp_path):
     """Twice what the network saw; answers stay where they were."""
     stream = io.BytesIO()
     Image.new("RGB", (2 * WIDTH, 2 * HEIGHT)).save(stream, "JPEG")
     scene, full = tmp_path / "scene.langflash", (2 * HEIGHT, 2 * WIDTH)
     save(replace(stripes(), photos=(stream.getvalue(),) * 2), scene)
-    assert run("render", scene, "-o", tmp_path / "a.png", *TORCH).code == 0
+    done("render", scene, "-o", tmp_path / "a.png", *TORCH)
     assert pixels(tmp_path / "a.png").shape[:2] == full
     asked = run("query", scene, "armchair", "-o", tmp_path / "q", "--npz", "--json", *TORCH).json()
     assert asked["size"] == [*full[::-1]] and pixels(tmp_path / "q" / "armchair_heat.png").shape[:2] == full
     assert np.load(tmp_path / "q" / "query.npz")["mask"].shape == (1, *full)
-    small = run(
-        "query", scene, "armchair", "-o", tmp_path / "s", "--size", f"{WIDTH}x{HEIGHT}", "--json", *TORCH
-    ).json()
+    words = ("-o", tmp_path / "s", "--size", f"{WIDTH}x{HEIGHT}", "--json", *TORCH)
+    small = run("query", scene, "armchair", *words).json()
     assert small["size"] == [WIDTH, HEIGHT]
     # A pixel of the smaller picture is 1 / WIDTH of it, and the stripe has one edge inside.
     assert abs(small["prompts"][0]["area"] - asked["prompts"][0]["area"]) <= 1 / WIDTH
     for name, what in (("coco.json", ""), ("numbers.npz", ""), ("mask.png", "mask"), ("cut.png", "")):
         said = ("--what", what) if what else ()
-        done = run("export", scene, "-o", tmp_path / name, "--prompt", "armchair", *said, *TORCH)
-        assert done.code == 0, done.err
+        done("export", scene, "-o", tmp_path / name, "--prompt", "armchair", *said, *TORCH)
     images = json.loads((tmp_path / "coco.json").read_text())["images"]
     assert [(image["height"], image["width"]) for image in images] == [full, full]
     assert np.load(tmp_path / "numbers.npz")["mask"].shape == (1, *full)
     for name in ("mask.png", "cut.png"):
         assert pixels(tmp_path / name).shape[:2] == full
     words = ("--segmented", "--prompt", "armchair", "--view", "2", *TORCH)
-    assert run("export", scene, "-o", tmp_path / "folder", *words).code == 0
+    done("export", scene, "-o", tmp_path / "folder", *words)
     assert pixels(tmp_path / "folder" / "photo_2" / "armchair_mask.png").shape == full
 
 
@@ -246,11 +214,10 @@ def test_pictures_have_the_size_of_the_photos(run, tmp_path):
         if picture.word
     ],
 )
-def test_render(run, scene_file, tmp_path, what, backend):
+def test_render(done, scene_file, tmp_path, what, backend):
     path = tmp_path / "new" / "a.png"
     words = ("render", scene_file, "-o", path, "--what", *what.split(), "--backend", backend, "--json")
-    outcome = run(*words)
-    assert outcome.code == 0, outcome.err
+    outcome = done(*words)
     document = outcome.json()
     assert document["file"] == str(path) and document["size"] == [WIDTH, HEIGHT]
     assert pixels(path).shape[:2] == (HEIGHT, WIDTH)
@@ -270,15 +237,12 @@ def aside_of(scene_file: Path, path: Path) -> Camera:
 
 @pytest.mark.parametrize("backend", ["gl", "torch"])
 @pytest.mark.parametrize("words", [("render",), ("export",), ("export", "--what", "rgb")])
-def test_gaps_are_filled_and_nothing_else(run, scene_file, tmp_path, backend, words):
+def test_gaps_are_filled_and_nothing_else(done, scene_file, tmp_path, backend, words):
     aside, path = tmp_path / "camera.json", tmp_path / "a.png"
     alphas = render(langflash_core.load(scene_file), aside_of(scene_file, aside)).alphas.numpy()
     pictures = []
     for fill in ([], ["--fill"]):
-        outcome = run(
-            words[0], scene_file, *words[1:], "-o", path, "--camera", aside, *fill, "--backend", backend
-        )
-        assert outcome.code == 0, outcome.err
+        done(words[0], scene_file, *words[1:], "-o", path, "--camera", aside, *fill, "--backend", backend)
         pictures.append(pixels(path).astype(int))
     plain, filled = pictures
     empty, covered = alphas < 0.01, alphas > 0.999
@@ -302,25 +266,16 @@ def test_filled_gaps_are_under_a_heat_map_and_answer_nothing(run, scene_file, tm
 @pytest.mark.parametrize(
     "words",
     [
-        ("export", "a.png", "--prompt", "armchair"),
-        ("export", "a.png", "--what", "cutout", "--prompt", "armchair"),
-        ("export", "a.png", "--what", "mask", "--prompt", "armchair"),
-        ("export", "a.png", "--what", "depth"),
-        ("export", "a.exr"),
-        ("export", "a.npz"),
-        ("export", "a.ply"),
-        ("export", "a.html"),
-        ("export", "a.mp4", "--prompt", "armchair"),
-        ("export", "folder", "--segmented", "--prompt", "armchair"),
-        ("render", "a.png", "--what", "depth"),
-        ("render", "a.png", "--what", "atoms"),
+        *(f"export a.png {words} --prompt armchair" for words in ("", "--what cutout", "--what mask")),
+        *("export a.png --what depth", "export a.exr", "export a.npz", "export a.ply", "export a.html"),
+        *("export a.mp4 --prompt armchair", "export folder --segmented --prompt armchair"),
+        *("render a.png --what depth", "render a.png --what atoms"),
     ],
 )
-def test_only_colours_of_the_whole_scene_have_gaps_to_fill(run, scene_file, tmp_path, words):
-    command, name, *more = words
-    outcome = run(command, scene_file, "-o", tmp_path / name, *more, "--fill")
-    assert outcome.code == 2 and len(outcome.err.strip().splitlines()) == 1
-    assert "--fill" in outcome.err and "; leave " in outcome.err and not (tmp_path / name).exists()
+def test_only_colours_of_the_whole_scene_have_gaps_to_fill(refused, scene_file, tmp_path, words):
+    command, name, *more = words.split()
+    said = refused(command, scene_file, "-o", tmp_path / name, *more, "--fill")
+    assert "--fill" in said and "; leave " in said
 
 
 @pytest.fixture
@@ -334,25 +289,22 @@ def of_photos(scene_file, tmp_path) -> Path:
 
 
 @pytest.mark.parametrize("backend", ["gl", "torch"])
-def test_what_no_photo_looked_at_from_there_fades(run, of_photos, tmp_path, backend):
+def test_what_no_photo_looked_at_from_there_fades(done, of_photos, tmp_path, backend):
     plain, aside = tmp_path / "plain.png", tmp_path / "camera.json"
     aside_of(of_photos, aside)
     pictures = {}
     for place in (["--view", "1"], ["--camera", str(aside)]):
         for fade in ([], ["--fade"]):
-            outcome = run("render", of_photos, "-o", plain, *place, *fade, "--backend", backend)
-            assert outcome.code == 0, outcome.err
+            done("render", of_photos, "-o", plain, *place, *fade, "--backend", backend)
             pictures[place[0], bool(fade)] = pixels(plain)
     assert np.array_equal(pictures["--view", True], pictures["--view", False])
     assert pictures["--camera", True].sum() < pictures["--camera", False].sum()
 
 
-def test_only_views_of_known_photos_fade(run, scene_file, of_photos, tmp_path):
-    outcome = run("export", of_photos, "-o", tmp_path / "a.ply", "--fade")
-    assert outcome.code == 2 and "leave --fade out" in outcome.err
-    assert run("export", of_photos, "-o", tmp_path / "a.png", "--fade", *TORCH).code == 0
-    outcome = run("export", scene_file, "-o", tmp_path / "b.png", "--fade", *TORCH)
-    assert outcome.code == 2 and "leave --fade out" in outcome.err and not (tmp_path / "b.png").exists()
+def test_only_views_of_known_photos_fade(done, refused, scene_file, of_photos, tmp_path):
+    assert "leave --fade out" in refused("export", of_photos, "-o", tmp_path / "a.ply", "--fade")
+    done("export", of_photos, "-o", tmp_path / "a.png", "--fade", *TORCH)
+    assert "leave --fade out" in refused("export", scene_file, "-o", tmp_path / "b.png", "--fade", *TORCH)
 
 
 def test_rendered_weights_are_the_stripe(run, scene_file, tmp_path):
@@ -364,27 +316,16 @@ def test_rendered_weights_are_the_stripe(run, scene_file, tmp_path):
 
 
 def test_labels_for_people(run, scene_file, tmp_path):
-    out = run(
-        "render",
-        scene_file,
-        "-o",
-        tmp_path / "a.png",
-        "--what",
-        "labels",
-        "--prompt",
-        "armchair",
-        "moon",
-        *TORCH,
-    ).out
+    words = ("--what", "labels", "--prompt", "armchair", "moon", *TORCH)
+    out = run("render", scene_file, "-o", tmp_path / "a.png", *words).out
     assert "armchair #" in out and "moon #" in out and "(not found)" in out
 
 
-def test_export_picture_and_cut_out(run, scene_file, tmp_path):
-    assert run("export", scene_file, "-o", tmp_path / "a.png", *TORCH).code == 0
+def test_export_picture_and_cut_out(done, scene_file, tmp_path):
+    done("export", scene_file, "-o", tmp_path / "a.png", *TORCH)
     assert pixels(tmp_path / "a.png").shape == (HEIGHT, WIDTH, 3)
     words = ("--prompt", "armchair", "submarine", "--threshold", "0.8")
-    outcome = run("export", scene_file, "-o", tmp_path / "b.png", *words, *TORCH)
-    assert outcome.code == 0, outcome.err
+    done("export", scene_file, "-o", tmp_path / "b.png", *words, *TORCH)
     alphas = pixels(tmp_path / "b.png")[..., 3]
     assert alphas[:, : WIDTH // 4].mean() > 200 and alphas[:, WIDTH // 2 :].max() == 0
 
@@ -419,13 +360,8 @@ def test_info_says_of_pruning_what_it_changed(run, scene_file, tmp_path):
     assert run("info", path, "--json").json()["pruning"] == report
     lines = run("info", path).out.split("pruning:\n")[1].splitlines()
     said = [line.strip() for line in lines if line.startswith("  ")]
-    assert said == [
-        "gaussians before: 9",
-        "faint: 2",
-        "gaussians after: 7",
-        "weights above 0 before: 20",
-        "weights above 0 after: 9,000",
-    ]
+    kept, weights = ["gaussians before: 9", "faint: 2", "gaussians after: 7"], "weights above 0"
+    assert said == [*kept, f"{weights} before: 20", f"{weights} after: 9,000"]
 
 
 def test_info_tells_a_light_that_shows(run, scene_file, tmp_path):
@@ -442,22 +378,7 @@ def test_info_tells_a_light_that_shows(run, scene_file, tmp_path):
 
 
 def test_json_is_all_of_stdout(scene_file, tmp_path):
-    done = subprocess.run(
-        [
-            sys.executable,
-            "-m",
-            "langflash_core",
-            "query",
-            scene_file,
-            "armchair",
-            "-o",
-            tmp_path / "o",
-            "--json",
-        ],
-        capture_output=True,
-        text=True,
-        timeout=60,
-    )
+    done = shell("query", scene_file, "armchair", "-o", tmp_path / "o", "--json")
     assert done.returncode == 0, done.stderr
     assert json.loads(done.stdout)["prompts"][0]["found"]
 
@@ -465,15 +386,13 @@ def test_json_is_all_of_stdout(scene_file, tmp_path):
 @pytest.mark.skipif(sys.platform != "linux", reason="EGL is Linux's")
 def test_without_opengl(scene_file, tmp_path):
     """Hide every EGL driver: gl by default gives way with a warning, gl by choice is an error."""
-    words = [sys.executable, "-m", "langflash_core", "render", scene_file, "-o", tmp_path / "a.png"]
+    words = ("render", scene_file, "-o", tmp_path / "a.png")
     hidden = {**os.environ, "__EGL_VENDOR_LIBRARY_FILENAMES": "/dev/null"}
-    given_way = subprocess.run(words, capture_output=True, text=True, env=hidden, timeout=60)
+    given_way = shell(*words, env=hidden)
     assert given_way.returncode == 0
     assert given_way.stderr.startswith("warning: ") and "torch" in given_way.stderr
     (tmp_path / "a.png").unlink()
-    asked = subprocess.run(
-        [*words, "--backend", "gl"], capture_output=True, text=True, env=hidden, timeout=60
-    )
+    asked = shell(*words, "--backend", "gl", env=hidden)
     assert asked.returncode == 1
     assert asked.stderr.startswith("langflash: ") and asked.stderr.count("\n") == 1
     assert not os.listdir(tmp_path)
@@ -485,17 +404,7 @@ def test_interrupted_at_a_terminal(scene_file, tmp_path):
     import pty
 
     terminal, side = pty.openpty()
-    words = [
-        "query",
-        scene_file,
-        "armchair",
-        "-o",
-        tmp_path / "out",
-        "--backend",
-        "torch",
-        "--size",
-        "8192x8192",
-    ]
+    words = ["query", scene_file, "armchair", "-o", tmp_path / "out", *TORCH, "--size", "8192x8192"]
     # Tests that a shell runs in the background ignore Ctrl-C, and a child would inherit that;
     # a handler of our own becomes the system's default in it.
     before = signal.signal(signal.SIGINT, signal.default_int_handler)
@@ -525,18 +434,15 @@ def test_help_and_version_answer_at_once():
     """No torch, no OpenGL: 0.3 s are promised; three times that on a machine busy with other tests."""
     for words in ([], ["--help"], ["--version"], ["query", "--size"]):
         start = time.perf_counter()
-        done = subprocess.run(
-            [sys.executable, "-m", "langflash_core", *words], capture_output=True, timeout=60
-        )
+        done = shell(*words)
         assert time.perf_counter() - start < 0.9
         assert done.returncode == (2 if "query" in words else 0)
     code = "import sys, app.cli.parser; sys.exit(bool({'torch', 'numpy', 'moderngl'} & set(sys.modules)))"
     assert subprocess.run([sys.executable, "-c", code], timeout=60).returncode == 0
 
 
-def test_nothing_found_is_an_answer(run, scene_file, tmp_path):
-    outcome = run("query", scene_file, "submarine", "-o", tmp_path, "--json", *TORCH)
-    assert outcome.code == 0
+def test_nothing_found_is_an_answer(done, scene_file, tmp_path):
+    outcome = done("query", scene_file, "submarine", "-o", tmp_path, "--json", *TORCH)
     assert [entry["found"] for entry in outcome.json()["prompts"]] == [False]
 
 
@@ -552,11 +458,10 @@ def test_window_needs_a_display(scene_file, tmp_path):
     if sys.platform != "linux":
         pytest.skip("elsewhere there is always a screen")
     hidden = {name: value for name, value in os.environ.items() if name not in ("DISPLAY", "WAYLAND_DISPLAY")}
-    words = [sys.executable, "-m", "langflash_core", "view"]
-    done = subprocess.run([*words, scene_file], capture_output=True, text=True, env=hidden, timeout=60)
+    done = shell("view", scene_file, env=hidden)
     assert done.returncode == 1, done.stderr
     assert done.stderr.startswith("langflash: ") and done.stderr.count("\n") == 1
-    missing = subprocess.run([*words, "gone.jpg"], capture_output=True, text=True, env=hidden, timeout=60)
+    missing = shell("view", "gone.jpg", env=hidden)
     assert missing.returncode == 2 and "gone.jpg" in missing.stderr
 
 
@@ -572,12 +477,11 @@ def test_the_window_opens_a_folder_as_its_photos(tmp_path, monkeypatch):
         view.run(Namespace(paths=[tmp_path / "empty"]), io.StringIO())
 
 
-def test_heat_maps_are_coloured_as_asked(run, scene_file, tmp_path):
+def test_heat_maps_are_coloured_as_asked(run, done, scene_file, tmp_path):
     pictures = []
     for index, words in enumerate(([], ["--colormap", "grey"], ["--colormap", "grey", "--span", "0,1"])):
         path = tmp_path / f"{index}.png"
-        done = run("export", scene_file, "-o", path, "--what", "heat", "--prompt", "armchair", *words)
-        assert done.code == 0
+        done("export", scene_file, "-o", path, "--what", "heat", "--prompt", "armchair", *words)
         pictures.append(np.asarray(Image.open(path)))
     assert len({picture.tobytes() for picture in pictures}) == 3
     refused = run("export", scene_file, "-o", tmp_path / "x.png", "--colormap", "grey")

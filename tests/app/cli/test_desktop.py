@@ -8,8 +8,8 @@ from xml.etree import ElementTree
 
 import pytest
 
-from app.cli import desktop_files
-from app.cli.desktop_files import ENTRY, ICON, KIND, TYPE, contents, install
+from app.cli.commands import desktop
+from app.cli.commands.desktop import ENTRY, ICON, KIND, TYPE, contents, install
 from langflash_core.errors import OutputError
 
 pytestmark = pytest.mark.skipif(not sys.platform.startswith("linux"), reason="XDG folders are Linux's")
@@ -55,7 +55,7 @@ def test_files_of_others_stay(run, data):
 
 
 def test_all_or_nothing(data, monkeypatch):
-    write, written = desktop_files.write_atomically, []
+    write, written = desktop.write_atomically, []
 
     def full(path, content):
         if len(written) == 2:
@@ -63,7 +63,7 @@ def test_all_or_nothing(data, monkeypatch):
         written.append(path)
         write(path, content)
 
-    monkeypatch.setattr(desktop_files, "write_atomically", full)
+    monkeypatch.setattr(desktop, "write_atomically", full)
     with pytest.raises(OutputError, match="No space"):
         install(data, ["/usr/bin/langflash"])
     assert len(written) == 2 and files(data) == set()

@@ -52,7 +52,7 @@ def test_a_worker_of_a_batch(asked, tmp_path, monkeypatch, detail, gaussians):
     assert "this is a test" in made.reason and asked == [(detail, gaussians)]
 
 
-def test_the_words_of_a_batch_are_its_order(run, tmp_path, monkeypatch):
+def test_the_words_of_a_batch_are_its_order(done, tmp_path, monkeypatch):
     """The order is what workers get and what the fingerprint is of."""
     orders = []
 
@@ -64,7 +64,7 @@ def test_the_words_of_a_batch_are_its_order(run, tmp_path, monkeypatch):
     (tmp_path / "sets" / "a").mkdir(parents=True)
     words = ("batch", tmp_path / "sets", "-o", tmp_path / "out")
     for more in ((), ("--detail", "high"), ("--gaussians", "2000")):
-        assert run(*words, *more).code == 0
+        done(*words, *more)
     assert [(order.detail, order.gaussians) for order in orders] == [
         ("normal", None),
         ("high", None),

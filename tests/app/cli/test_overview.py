@@ -13,9 +13,9 @@ from app.cli.parser import COMMANDS, build_parser
 COLUMNS = 80  # of a terminal as it opens
 
 
-def test_alone_it_shows_the_commands_of_a_first_day(run):
-    outcome = run()
-    assert outcome.code == 0 and not outcome.err
+def test_alone_it_shows_the_commands_of_a_first_day(done):
+    outcome = done()
+    assert not outcome.err
     lines = outcome.out.splitlines()
     examples = [line for line in lines if line.startswith("  langflash ")]
     assert [line.split()[1] for line in examples] == ["reconstruct", "view", "query", "render", "export"]
@@ -36,11 +36,10 @@ def test_every_command_has_one_heading():
 
 
 @pytest.mark.parametrize("columns", [30, COLUMNS, 200])
-def test_help_lists_commands_in_groups(run, monkeypatch, columns):
+def test_help_lists_commands_in_groups(done, monkeypatch, columns):
     """However wide the terminal is; a command with its purpose, below its heading."""
     monkeypatch.setenv("COLUMNS", str(columns))
-    outcome = run("--help")
-    assert outcome.code == 0
+    outcome = done("--help")
     said = re.split(r"^(\S.*):$", outcome.out, flags=re.MULTILINE)
     blocks = dict(zip(said[1::2], said[2::2], strict=True))
     assert list(blocks) == [*GROUPS, "options"]

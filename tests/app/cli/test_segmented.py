@@ -50,11 +50,11 @@ def test_the_manifest_names_every_file(folder, manifest):
     assert set(manifest["views"][0]["files"]["phrases"]) == {"armchair", "floor lamp"}
 
 
-def test_its_command_makes_it_again(run, folder, manifest, tmp_path):
+def test_its_command_makes_it_again(done, folder, manifest, tmp_path):
     words = shlex.split(manifest["command"])
     assert words[0] == "langflash" and words[words.index("-o") + 1] == str(folder)
     words[words.index("-o") + 1] = str(tmp_path / "again")
-    assert run(*words[1:]).code == 0
+    done(*words[1:])
     before, after = files_of(folder), files_of(tmp_path / "again")
     assert after.keys() == before.keys()
     differing = [name for name in before if before[name] != after[name]]
@@ -89,12 +89,11 @@ def test_depth_comes_back_by_the_scale_in_the_manifest(folder, manifest):
     assert view["viewmat"] == stripes().viewmats[1].tolist() and (view["width"], view["height"]) == (56, 42)
 
 
-def test_a_scene_of_known_scale_is_in_metres(run, tmp_path):
+def test_a_scene_of_known_scale_is_in_metres(done, tmp_path):
     from langflash_core.scene.file import save
 
     save(stripes().with_record(metric_scale=2.5), tmp_path / "m.langflash")
-    outcome = run("export", tmp_path / "m.langflash", "-o", tmp_path / "m", "--segmented", *ASKED, *TORCH)
-    assert outcome.code == 0
+    done("export", tmp_path / "m.langflash", "-o", tmp_path / "m", "--segmented", *ASKED, *TORCH)
     manifest = json.loads((tmp_path / "m" / "manifest.json").read_text("utf-8"))
     depth = pixels(tmp_path / "m" / "photo_1" / "depth.png") * manifest["depth"]["step"]
     assert manifest["unit"] == "m" and np.abs(depth[2:-2, 2:-2] - 2.5).max() < 3e-3
@@ -110,36 +109,34 @@ def test_boxes_are_bodies_by_name(folder, manifest):
     np.testing.assert_allclose(pose[:3, 3], np.array(centre) * [-1, -1, 1], atol=1e-5)
 
 
-def test_what_a_package_is_missing_for_is_left_out_and_said(run, scene_file, tmp_path, monkeypatch):
+def test_what_a_package_is_missing_for_is_left_out_and_said(done, scene_file, tmp_path, monkeypatch):
     for name in ("OpenEXR", "skimage", "skimage.measure"):
         monkeypatch.setitem(sys.modules, name, None)
-    outcome = run("export", scene_file, "-o", tmp_path / "out", "--segmented", *ASKED, *TORCH)
-    assert outcome.code == 0 and outcome.out.count("langflash[views]") == 2
+    outcome = done("export", scene_file, "-o", tmp_path / "out", "--segmented", *ASKED, *TORCH)
+    assert outcome.out.count("langflash[views]") == 2
     manifest = json.loads((tmp_path / "out" / "manifest.json").read_text("utf-8"))
     assert set(manifest["left_out"]) == {"depth.exr", "surfaces.glb"}
     assert "surfaces" not in manifest["files"] and not list(tmp_path.rglob("*.exr"))
 
 
-def test_one_view_and_a_size(run, scene_file, tmp_path):
+def test_one_view_and_a_size(done, scene_file, tmp_path):
     words = ("--segmented", "--view", "2", "--size", "28x21", *ASKED, *TORCH)
-    assert run("export", scene_file, "-o", tmp_path / "out", *words).code == 0
+    done("export", scene_file, "-o", tmp_path / "out", *words)
     assert {path.name for path in (tmp_path / "out").iterdir() if path.is_dir()} == {"photo_2"}
     assert pixels(tmp_path / "out" / "photo_2" / "rgb.png").shape == (21, 28, 3)
     manifest = json.loads((tmp_path / "out" / "manifest.json").read_text("utf-8"))
     assert "--view 2 --size 28x21" in manifest["command"] and manifest["views"][0]["view"] == 2
 
 
-def test_phrases_may_be_called_union(run, scene_file, tmp_path):
+def test_phrases_may_be_called_union(done, scene_file, tmp_path):
     words = ("--segmented", "--threshold", "0.01", "--prompt", "union", "!?", *TORCH)
-    assert run("export", scene_file, "-o", tmp_path / "out", *words).code == 0
+    done("export", scene_file, "-o", tmp_path / "out", *words)
     names = {path.name for path in (tmp_path / "out" / "photo_1").iterdir()}
     assert {"union_mask.png", "union_2_mask.png", "prompt_2_mask.png"} <= names
 
 
-def test_backends_agree(run, scene_file, tmp_path, folder):
-    assert (
-        run("export", scene_file, "-o", tmp_path / "gl", "--segmented", *ASKED, "--backend", "gl").code == 0
-    )
+def test_backends_agree(done, scene_file, tmp_path, folder):
+    done("export", scene_file, "-o", tmp_path / "gl", "--segmented", *ASKED, "--backend", "gl")
     for name in ("armchair_soft.png", "union_soft.png"):
         exact, drawn = (pixels(place / "photo_1" / name) / 65535.0 for place in (folder, tmp_path / "gl"))
         assert np.abs(exact - drawn).max() < 5e-3  # sums in float16
@@ -149,32 +146,32 @@ def test_backends_agree(run, scene_file, tmp_path, folder):
 
 
 @pytest.mark.parametrize("what", ["soft", "cutout", "instances"])
-def test_single_pictures_are_those_of_the_folder(run, scene_file, tmp_path, folder, what):
+def test_single_pictures_are_those_of_the_folder(done, scene_file, tmp_path, folder, what):
     words = ("--all-views", "--what", what, *ASKED, *TORCH)
-    assert run("export", scene_file, "-o", tmp_path / "a.png", *words).code == 0
+    done("export", scene_file, "-o", tmp_path / "a.png", *words)
     name = "instances.png" if what == "instances" else f"union_{what}.png"
     for number in (1, 2):
         assert np.array_equal(pixels(tmp_path / f"a_{number}.png"), pixels(folder / f"photo_{number}" / name))
     assert (tmp_path / "a_1.json").exists() == (what == "instances")
 
 
-def test_single_depths(run, scene_file, tmp_path, folder, manifest):
-    assert run("export", scene_file, "-o", tmp_path / "a.png", "--what", "depth", *TORCH).code == 0
+def test_single_depths(done, scene_file, tmp_path, folder, manifest):
+    done("export", scene_file, "-o", tmp_path / "a.png", "--what", "depth", *TORCH)
     first, again = pixels(folder / "photo_1" / "depth.png"), pixels(tmp_path / "a.png")
     with Image.open(tmp_path / "a.png") as picture:
         step = float(picture.info["step"])
     assert np.abs(first * manifest["depth"]["step"] - again * step).max() <= step + manifest["depth"]["step"]
     exr = pytest.importorskip("OpenEXR")
-    assert run("export", scene_file, "-o", tmp_path / "a.exr", *TORCH).code == 0
+    done("export", scene_file, "-o", tmp_path / "a.exr", *TORCH)
     with exr.File(str(tmp_path / "a.exr")) as file:
         assert np.abs(file.channels()["Z"].pixels - again * step).max() <= step
 
 
-def test_a_surface_as_a_mesh(run, scene_file, tmp_path):
+def test_a_surface_as_a_mesh(done, scene_file, tmp_path):
     pytest.importorskip("skimage")
     words = ("--what", "surface", "--prompt", "armchair", "wooden floor", *TORCH)
-    outcome = run("export", scene_file, "-o", tmp_path / "a.glb", *words)
-    assert outcome.code == 0 and "2 surfaces" in outcome.out, outcome
+    outcome = done("export", scene_file, "-o", tmp_path / "a.glb", *words)
+    assert "2 surfaces" in outcome.out
     bodies = trimesh.load_scene(tmp_path / "a.glb")
     assert set(bodies.geometry) == {"armchair", "wooden floor"}
     low, high = bodies.bounds

@@ -144,23 +144,22 @@ def test_gl_reads_the_colours_that_the_frame_has():
     renderer.release()
 
 
-def test_an_animated_webp(run, scene_file, tmp_path):
+def test_an_animated_webp(done, scene_file, tmp_path):
     pytest.importorskip("imageio_ffmpeg")
     words = ("--what", "heat", "--prompt", "armchair", "--seconds", "0.4", "--size", "65x49", *TORCH)
-    outcome = run("export", scene_file, "-o", tmp_path / "a.webp", *words)
-    assert outcome.code == 0 and "0.4 s, 64 x 48" in outcome.out, outcome
+    outcome = done("export", scene_file, "-o", tmp_path / "a.webp", *words)
+    assert "0.4 s, 64 x 48" in outcome.out
     with Image.open(tmp_path / "a.webp") as film:
         assert (film.n_frames, film.size, film.info["loop"]) == (12, (64, 48), 0)  # type: ignore[attr-defined]
         film.seek(6)
         assert np.asarray(film.convert("RGB"))[:, :15].mean() > 60
 
 
-def test_a_film_along_key_frames(run, scene_file, tmp_path):
+def test_a_film_along_key_frames(run, done, scene_file, tmp_path):
     film = pytest.importorskip("imageio_ffmpeg")
     keys = written(tmp_path, [key(0.0, 0.0), key(0.3, 0.2)])
     words = ("--path", keys, "--seconds", "0.5", *TORCH)
-    outcome = run("export", scene_file, "-o", tmp_path / "a.mp4", *words)
-    assert outcome.code == 0, outcome
+    done("export", scene_file, "-o", tmp_path / "a.mp4", *words)
     assert next(film.read_frames(str(tmp_path / "a.mp4")))["size"] == (56, 42)
     refused = run("export", scene_file, "-o", tmp_path / "b.mp4", "--path", tmp_path / "gone.json", *TORCH)
     assert refused.code == 2 and "gone.json" in refused.err and not (tmp_path / "b.mp4").exists()

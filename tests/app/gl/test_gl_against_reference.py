@@ -6,12 +6,11 @@ import math
 import pytest
 import torch
 
-from app.gl import SplatRenderer
 from app.gl.layout import ATOMS_A_LAYER, ATOMS_A_PASS
 from langflash_core.language.relevance import relevance_maps
 from langflash_core.splat import render
 from tests.app.gl.questions import draw, full_relevance, psnr, question
-from tests.splat.scenes import camera, cloud, maps_of, parallel, scene_of, splats, turned
+from tests.splat.scenes import camera, cloud, maps_of, parallel, turned
 
 # float16 keeps 11 bits, 5e-4 of a value, and back-to-front blending rounds once a layer while
 # later layers shrink earlier errors: about 60 dB. float32 is limited by the few pixels where
@@ -45,17 +44,15 @@ def test_colour_depth_and_transmittance(gl, precision, degree):
     assert_agrees(frame, expected, precision)
 
 
-def test_colours_in_the_light_of_a_place(gl, precision):
+def test_colours_in_the_light_of_a_place(show, precision):
     """Another light is another picture, though nothing else of the camera changes."""
     scene = cloud(1000, degree=1, dtype=torch.float32)
     plain = camera(96, 80, 80.0, turned(0.15, (0.1, 0.0, 0.1)))
-    renderer = SplatRenderer(gl, precision)
-    renderer.set_scene(scene)
+    renderer = show(scene, precision)
     for light in (None, torch.tensor([[1.4, 1.2, 0.8], [0.2, -0.1, -0.3]]), None):
         seen = dataclasses.replace(plain, light=light)
         renderer.draw(seen)
         assert_agrees(renderer.frame(weight_maps=True), render(scene, seen), precision)
-    renderer.release()
 
 
 @pytest.mark.parametrize("degree", [0, 3])
@@ -68,28 +65,25 @@ def test_parallel_rays(gl, precision, degree):
     assert (maps_of(frame) - maps_of(expected)).abs().mean() <= WEIGHT_ERROR[precision]
 
 
-def test_parallel_rays_are_another_picture_of_the_same_place(gl):
+def test_parallel_rays_are_another_picture_of_the_same_place(show):
     scene, pinhole = cloud(500, dtype=torch.float32), camera(64, 48, 50.0)
     flat = dataclasses.replace(pinhole, orthographic=True)
-    renderer = SplatRenderer(gl, "float32")
-    renderer.set_scene(scene)
+    renderer = show(scene, "float32")
     renderer.draw(pinhole)
     first = renderer.frame().rgb
     renderer.draw(flat)
     second = renderer.frame().rgb
-    renderer.release()
     assert psnr(second, render(scene, flat).rgb) >= PSNR["float32"]
     assert psnr(second, first) < 20
 
 
 @pytest.mark.parametrize("num_atoms", [0, 1, 23, 24, 25, 130])
 @pytest.mark.parametrize("kept", [1, 8])
-def test_weight_maps_and_relevance(gl, precision, num_atoms, kept):
+def test_weight_maps_and_relevance(show, precision, num_atoms, kept):
     scene = cloud(1500, num_atoms, kept, dtype=torch.float32)
     seen = camera(64, 48, 50.0)
     expected = render(scene, seen)
-    renderer = SplatRenderer(gl, precision)
-    renderer.set_scene(scene)
+    renderer = show(scene, precision)
     renderer.draw(seen)
     assert renderer.passes["weights"] == math.ceil(num_atoms / ATOMS_A_PASS)
     maps = maps_of(renderer.frame(weight_maps=True))
@@ -109,10 +103,9 @@ def test_weight_maps_and_relevance(gl, precision, num_atoms, kept):
         # 8e-6 sqrt(K) / |w R|, here some 3e-5, times temperature / 4; on average a tenth of that.
         assert (relevance - twin).abs().max() <= 2e-4
         assert (relevance - twin).abs().mean() <= 2e-5
-    renderer.release()
 
 
-def test_the_atoms_a_pass_are_one_number(gl, monkeypatch):
+def test_the_atoms_a_pass_are_one_number(show, monkeypatch):
     """Another number of layers draws the same maps in more passes: nothing else counts them."""
     scene, seen = cloud(600, 50, 8, dtype=torch.float32), camera()
     drawn = []
@@ -120,42 +113,36 @@ def test_the_atoms_a_pass_are_one_number(gl, monkeypatch):
         for module in ("app.gl.weights", "app.gl.processor.cell_maps"):
             monkeypatch.setattr(f"{module}.LAYERS_A_PASS", layers)
             monkeypatch.setattr(f"{module}.ATOMS_A_PASS", ATOMS_A_LAYER * layers)
-        renderer = SplatRenderer(gl)
-        renderer.set_scene(scene)
+        renderer = show(scene)
         renderer.draw(seen)
         assert renderer.passes["weights"] == passes
         renderer.ask(question(scene, 5))
         drawn.append((maps_of(renderer.frame(weight_maps=True)), renderer.relevance()))
-        renderer.release()
     assert torch.equal(drawn[0][0], drawn[1][0]) and torch.equal(drawn[0][1], drawn[1][1])
 
 
 @pytest.mark.parametrize("num_prompts", [1, 4, 16, 17])
 @pytest.mark.parametrize("num_negatives", [1, 4, 7])
-def test_any_number_of_phrases(gl, num_prompts, num_negatives):
+def test_any_number_of_phrases(show, num_prompts, num_negatives):
     scene = cloud(500, 24, dtype=torch.float32)
     seen = camera()
-    renderer = SplatRenderer(gl, "float32")
-    renderer.set_scene(scene)
+    renderer = show(scene, "float32")
     renderer.draw(seen)
     compiled = question(scene, num_prompts, num_negatives=num_negatives)
     renderer.ask(compiled)
     truth = full_relevance(scene, compiled, maps_of(render(scene, seen)))
     assert (renderer.relevance() - truth).abs().mean() <= RELEVANCE_ERROR["float32"]
-    renderer.release()
 
 
-def test_only_atoms_in_view_are_drawn(gl):
+def test_only_atoms_in_view_are_drawn(show):
     scene = cloud(300, 130, dtype=torch.float32)
     ids = scene.semantics.weight_ids % 5 + 100  # five of 130
     scene = dataclasses.replace(scene, semantics=dataclasses.replace(scene.semantics, weight_ids=ids))
-    renderer = SplatRenderer(gl)
-    renderer.set_scene(scene)
+    renderer = show(scene)
     renderer.draw(camera())
     assert renderer.passes["weights"] == 1
     maps = maps_of(renderer.frame(weight_maps=True))
     assert maps[..., :100].abs().max() == 0 and maps[..., 100:105].amax((0, 1)).min() > 0
-    renderer.release()
 
 
 def test_splitting_and_permuting_atoms_changes_no_relevance(renderer):
@@ -194,17 +181,3 @@ def test_splitting_and_permuting_atoms_changes_no_relevance(renderer):
     # Halved weights round alike in floating point; permuted ones add up in another order.
     assert (relevances[1] - relevances[0]).abs().max() <= 2e-5
     assert (relevances[2] - relevances[0]).abs().max() <= 2e-5
-
-
-def test_empty_pixels_are_zero(renderer):
-    scene = cloud(0, 3, dtype=torch.float32)
-    renderer.set_scene(scene)
-    renderer.draw(camera())
-    renderer.ask(question(scene))
-    frame = renderer.frame(weight_maps=True)
-    for values in (frame.rgb, frame.alphas, frame.depths, maps_of(frame), renderer.relevance()):
-        assert values.abs().max() == 0
-    corner = scene_of(splats([(0.0, 0.0, 2.0)], dtype=torch.float32))
-    renderer.set_scene(corner)
-    renderer.draw(camera())
-    assert renderer.frame().alphas[0, 0] == 0 and renderer.frame().depths[0, 0] == 0

@@ -1,6 +1,7 @@
 """The pictures that answer and those that say what to trust, against float64 arithmetic on the reference."""
 
 import dataclasses
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -8,9 +9,8 @@ import torch
 
 from app.gl import SplatRenderer, paints
 from app.gl.colours import feature_axes
-from app.gl.painter import Painter
 from app.gl.paints import PAINTS, Wanted
-from app.gl.photos import SAME, WORST, PhotoDepths
+from app.gl.photos import MOST_PHOTOS, SAME, WORST, spread
 from langflash_core.base import pictures
 from langflash_core.base.colormaps import HeatColours, colour_bar
 from langflash_core.base.formats import COLOUR_MAPS
@@ -261,16 +261,11 @@ def test_photo_depths_follow_the_scene_and_leave_it_alone(exact):
         paints.trust(exact, True)
 
 
-def test_photo_depths_are_the_references(gl, exact):
-    painter = Painter(gl)
-    made = PhotoDepths(painter, stereo(double=False), own=False)
-    width, height, count = made.texture.size
-    drawn = np.frombuffer(made.texture.read(), np.float32).reshape(count, height, width)
-    made.release()
-    painter.release()
-    for view in range(2):
-        frame = render(stereo(), stereo().camera(view), weight_maps=False)
-        sure = np.abs(frame.alphas.numpy() - 0.5) > 1e-3
-        expected = np.where(frame.alphas >= 0.5, frame.depths, 0)
-        # Float32 sums of a few hundred terms, as in test_gl_against_reference.py.
-        np.testing.assert_allclose(drawn[view][sure], expected[sure], atol=1e-4)
+def test_of_many_photos_some_are_asked_from_the_first_to_the_last():
+    for count in (1, 2, MOST_PHOTOS):
+        assert spread(count) == list(range(count))
+    for count in (MOST_PHOTOS + 1, 128, 300):
+        views = spread(count)
+        assert len(set(views)) == MOST_PHOTOS and views[0] == 0 and views[-1] == count - 1
+        gaps = [b - a for a, b in pairwise(views)]
+        assert max(gaps) - min(gaps) <= 1

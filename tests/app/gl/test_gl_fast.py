@@ -5,7 +5,6 @@ from dataclasses import replace
 import pytest
 import torch
 
-from app.gl import SplatRenderer
 from app.gl.fast import MAX_PHRASES
 from langflash_core.language.relevance import CompiledQuery
 from langflash_core.language.settings import RELEVANCE
@@ -37,19 +36,16 @@ def twin(scene: Scene, compiled: CompiledQuery, seen: Camera) -> torch.Tensor:
 @pytest.mark.parametrize("precision", ["float16", "float32"])
 @pytest.mark.parametrize("mode", ["relevancy", "cosine"])
 @pytest.mark.parametrize("num_prompts", [1, 2, 3, 5, MAX_PHRASES])
-def test_numbers_are_splatted_as_the_twin_says(gl, precision, mode, num_prompts):
+def test_numbers_are_splatted_as_the_twin_says(show, precision, mode, num_prompts):
     scene, seen = cloud(300, 6, size=0.06), camera()
     compiled = question(scene, num_prompts, mode)
-    renderer = SplatRenderer(gl, precision)
-    renderer.set_scene(scene)
-    renderer.ask(compiled)
+    renderer = show(scene, precision, asked=compiled)
     renderer.draw(seen, fast=True)
     error = (renderer.relevance() - twin(scene, compiled, seen)).abs()
     solid = maps_of(render(scene, seen)).sum(-1) > 0.1
     # A handful of layers lose a step each, in the sum above and in the one below; temperature and slope: 2.5.
     assert error[:, solid].max() <= 2.5 * 8 * STEP[precision] + 1e-5
     assert error.mean() <= 2 * STEP[precision] + 1e-6
-    renderer.release()
 
 
 def test_colour_and_depth_are_those_of_the_exact_mode(renderer):
@@ -64,20 +60,17 @@ def test_colour_and_depth_are_those_of_the_exact_mode(renderer):
     assert torch.equal(exact.rgb, fast.rgb) and torch.equal(exact.depths, fast.depths)
 
 
-def test_gaussians_of_one_meaning_are_answered_exactly(gl):
+def test_gaussians_of_one_meaning_are_answered_exactly(show):
     """Where all Gaussians of a pixel say the same, the fast answer is the exact one."""
     scene = cloud(200, 4, 1, size=0.06)
     ids = torch.full_like(scene.semantics.weight_ids, 2)
     scene = replace(scene, semantics=replace(scene.semantics, weight_ids=ids))
     compiled = question(scene, 2)
-    renderer = SplatRenderer(gl, "float32")
-    renderer.set_scene(scene)
-    renderer.ask(compiled)
+    renderer = show(scene, "float32", asked=compiled)
     renderer.draw(camera(), fast=True)
     fast = renderer.relevance()
     expected = full_relevance(scene, compiled, maps_of(render(scene, camera())))
     assert (fast - expected).abs().max() <= 1e-5  # float32 and a sigmoid
-    renderer.release()
 
 
 def test_a_moving_camera_costs_one_splat_pass_a_picture(renderer):

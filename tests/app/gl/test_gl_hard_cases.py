@@ -132,10 +132,10 @@ def test_alpha_of_exactly_1_over_255_is_drawn(gl, precision):
             assert int((frame.alphas > 0).sum()) == int(visible)
 
 
-def test_no_edge_of_a_quad_is_seen(gl, precision):
+def test_no_edge_of_a_quad_is_seen(show, precision):
     """Anisotropic, faint and solid, off the pixel grid: only the cut at 1/255 may differ, by rounding."""
     g = torch.Generator().manual_seed(5)
-    renderer = SplatRenderer(gl, precision)
+    renderer = show(None, precision)
     flipped = 0
     for opacity in (0.0041, 0.006, 0.02, 0.1, 0.5, 1.0, 3.0) * 5:
         scene = cloud(1, 0, size=0.15, seed=int(torch.randint(1 << 30, (), generator=g)), dtype=torch.float32)
@@ -150,7 +150,6 @@ def test_no_edge_of_a_quad_is_seen(gl, precision):
         within("edge", difference.max(), CUT)
         flipped += int((difference > ALPHA).sum())
     assert flipped <= 3, "of 35 rims of some tens of pixels, rounding reaches hardly any"
-    renderer.release()
 
 
 # --- sizes, places, order -------------------------------------------------------------------------
@@ -197,11 +196,11 @@ def test_needles_from_far_outside(gl, precision, away):
     agree(draw(gl, precision, scene, camera()), render(scene, camera()), precision, alpha=limit)
 
 
-def test_nothing_nearer_than_near(gl, precision):
+def test_nothing_nearer_than_near(show, precision):
     """Behind, at the camera's centre, just before 0.01: not drawn. The float32 next to it: drawn."""
     border = np.float32(0.01)  # below 0.01 by rounding
     hidden = [-1.0, -1e-30, 0.0, 1e-38, 1e-3, float(border)]
-    renderer = SplatRenderer(gl, precision)
+    renderer = show(None, precision)
     for depth in hidden:
         scene = scene_of(splats([(0.0, 0.0, depth)], 1e-4, dtype=torch.float32))
         renderer.set_scene(scene)
@@ -214,7 +213,6 @@ def test_nothing_nearer_than_near(gl, precision):
     renderer.draw(centred())
     agree(renderer.frame(weight_maps=True), render(scene, centred()), precision)
     assert renderer.frame().alphas.max() > 0.5
-    renderer.release()
 
 
 @pytest.mark.parametrize("away", [100.0, 1e4, 1e5])
@@ -250,7 +248,7 @@ def test_depths_from_1e_3_to_1e6(gl, precision, yaw):
     assert torch.equal(draw(gl, precision, hidden, seen).rgb, frame.rgb)
 
 
-def test_far_floaters_ruin_no_order(gl, precision):
+def test_far_floaters_ruin_no_order(show, precision):
     """Up to 1e30 away: 16-bit or shared-range sort keys would put all else in one bin."""
     near = cloud(600, 0, dtype=torch.float32).gaussians
     floaters = splats([(0.01 * z, 0.0, z) for z in np.geomspace(1e3, 1e30, 9)], 1.0, dtype=torch.float32)
@@ -262,15 +260,13 @@ def test_far_floaters_ruin_no_order(gl, precision):
     orders = []
     for gaussians in (near, both):
         watched = Watched()
-        renderer = SplatRenderer(gl, precision, splats=watched)
-        renderer.set_scene(scene_of(gaussians))
+        renderer = show(scene_of(gaussians), precision, splats=watched)
         renderer.draw(camera())
         orders.append(watched.made.order)
         if gaussians is both:
             # About ten layers a pixel, of which the front ones shrink the errors of those behind.
             agree(renderer.frame(True), render(scene_of(both), camera()), precision, steps=4)
             assert renderer.depth_range[1] < 10, "the depth picture keeps its contrast, too"
-        renderer.release()
     np.testing.assert_array_equal(orders[1][orders[1] >= 9] - 9, orders[0])
 
 
@@ -292,15 +288,14 @@ def test_of_equal_depths_the_first_is_in_front(gl, precision):
     within("shares", largest(frame.rgb[10, 10], torch.tensor([0.5, 0.25, 0.125])), STEP[precision])
 
 
-def test_equal_depths_stay_equal_in_any_view(gl, precision):
+def test_equal_depths_stay_equal_in_any_view(show, precision):
     """37 triples under a turned camera: in the order of the reference, the first of three in front."""
     g = torch.Generator().manual_seed(2)
     places = torch.rand(37, 3, generator=g) - 0.5 + torch.tensor([0.0, 0.0, 2.0])
     means = [tuple(row) for row in places.repeat_interleave(3, 0).tolist()]
     gaussians = splats(means, 0.05, 0.9, [RED, GREEN, BLUE] * 37, torch.float32)
     watched = Watched()
-    renderer = SplatRenderer(gl, precision, splats=watched)
-    renderer.set_scene(scene_of(gaussians))
+    renderer = show(scene_of(gaussians), precision, splats=watched)
     for yaw in (0.1, 0.2, 0.3):
         seen = camera(pose=turned(yaw, (0.1, 0.0, 0.2)))
         renderer.draw(seen)
@@ -310,7 +305,6 @@ def test_equal_depths_stay_equal_in_any_view(gl, precision):
         assert (nearest_first.unflatten(0, (37, 3)) % 3 == torch.arange(3)).all()
         # Three layers a splat and a few splats a pixel.
         agree(renderer.frame(True), render(scene_of(gaussians), seen), precision, steps=6)
-    renderer.release()
 
 
 QUATS = [
@@ -341,7 +335,7 @@ def test_negative_scales_are_their_size(gl, precision):
 
 
 @pytest.mark.parametrize("field", ["means", "quats", "scales", "opacities", "sh", "weight_values"])
-def test_not_finite_is_dropped_and_counted(gl, precision, field):
+def test_not_finite_is_dropped_and_counted(gl, show, precision, field):
     scene = cloud(60, dtype=torch.float32)
     kept = torch.ones(60, dtype=torch.bool)
     kept[::10] = False
@@ -362,14 +356,12 @@ def test_not_finite_is_dropped_and_counted(gl, precision, field):
         poisoned = dataclasses.replace(
             scene, **{"semantics" if field == "weight_values" else "gaussians": owner}
         )
-        renderer = SplatRenderer(gl, precision)
-        renderer.set_scene(poisoned)
+        renderer = show(poisoned, precision)
         renderer.draw(camera())
         renderer.ask(question(poisoned))
         frame = renderer.frame(weight_maps=True)
         assert torch.equal(frame.rgb, expected.rgb) and torch.equal(maps_of(frame), maps_of(expected))
         assert torch.isfinite(renderer.relevance()).all()
-        renderer.release()
         truth = render(poisoned, camera())
         agree(frame, truth, precision, steps=4)  # a few layers a pixel
 
@@ -402,11 +394,10 @@ def test_opacity_0_and_1(gl, precision):
 
 
 @pytest.mark.parametrize("count", [0, 1, 2])
-def test_few_gaussians(gl, precision, count):
+def test_few_gaussians(show, precision, count):
     scene = cloud(count, 3, size=0.1, dtype=torch.float32)
     expected = render(scene, camera(), background=(0.1, 0.2, 0.3))
-    renderer = SplatRenderer(gl, precision)
-    renderer.set_scene(scene)
+    renderer = show(scene, precision)
     renderer.draw(camera(), background=(0.1, 0.2, 0.3))
     compiled = question(scene)
     renderer.ask(compiled)
@@ -422,15 +413,15 @@ def test_few_gaussians(gl, precision, count):
         2.5 * 4 * STEP[precision] + 1e-5,
     )
     empty = expected.alphas == 0
-    assert empty.any() and frame.alphas[empty].max() == 0 and maps_of(frame)[empty].abs().max() == 0
+    assert empty.any()
+    assert all(part[empty].abs().max() == 0 for part in (frame.alphas, frame.depths, maps_of(frame)))
     assert renderer.relevance()[:, empty].abs().max() == 0
-    renderer.release()
 
 
 @pytest.mark.parametrize("num_atoms", [0, 1, 23, 24, 25, 128, 256])
-def test_any_number_of_atoms_and_weights(gl, precision, num_atoms):
+def test_any_number_of_atoms_and_weights(show, precision, num_atoms):
     seen = camera(20, 16, 18.0)
-    renderer = SplatRenderer(gl, precision)
+    renderer = show(None, precision)
     for kept in range(1, 9):
         scene = cloud(150, num_atoms, kept, seed=kept, size=0.06, dtype=torch.float32)
         expected = render(scene, seen)
@@ -451,7 +442,6 @@ def test_any_number_of_atoms_and_weights(gl, precision, num_atoms):
         error = (renderer.relevance() - truth).abs()
         within("relevance, mean", error.mean(), STEP[precision] + PACKED / 2)
         within("relevance", error[:, expected.alphas > 0.1].max(), 10 * STEP[precision] + 20 * PACKED)
-    renderer.release()
 
 
 def test_colours_out_of_range(gl, precision):
@@ -495,7 +485,7 @@ def test_any_pinhole_and_size(gl, precision, name):
 # white at alpha = 0.004, the thinnest layer drawn, and 1 % at 0.05 (llvmpipe cuts; rounding halves it).
 # Alphas and depths are float32 and do not suffer; cosines hardly, as all maps lose about the same share.
 @pytest.mark.parametrize("opacity", [0.004, 0.01, 0.05])
-def test_10000_thin_layers(gl, precision, opacity):
+def test_10000_thin_layers(show, precision, opacity):
     count = 10_000
     depth = 1 + 1e-4 * torch.arange(count)[:, None]
     g = torch.Generator().manual_seed(0)
@@ -511,8 +501,7 @@ def test_10000_thin_layers(gl, precision, opacity):
     scene = scene_of(gaussians, torch.tensor([[0, 1, 2]]).repeat(count, 1), values, atoms)
     seen = camera(5, 4, 4.0)
     expected = render(scene, seen)
-    renderer = SplatRenderer(gl, precision)
-    renderer.set_scene(scene)
+    renderer = show(scene, precision)
     renderer.draw(seen)
     compiled = question(scene, 3)
     renderer.ask(compiled)
@@ -523,7 +512,6 @@ def test_10000_thin_layers(gl, precision, opacity):
     within("maps", largest(maps_of(frame), maps_of(expected)), 0.51 * STEP[precision] / opacity)
     truth = full_relevance(scene, compiled, maps_of(expected))
     within("relevance", largest(renderer.relevance(), truth), {"float16": 5e-3, "float32": 1e-5}[precision])
-    renderer.release()
 
 
 # --- questions ----------------------------------------------------------------------------------------
@@ -669,30 +657,25 @@ def all_around(num_atoms: int = 30) -> Scene:
 
 
 @pytest.mark.parametrize("weight_maps", [True, False])
-def test_half_a_turn_in_one_frame(gl, precision, weight_maps):
+def test_half_a_turn_in_one_frame(gl, show, precision, weight_maps):
     """Draw, turn, draw: whatever was drawn before, a view equals a fresh one bit by bit."""
     scene = all_around()
     views = [camera(), camera(pose=turned(math.pi, (0.0, 0.0, 0.0)))]
     expected = [fresh(gl, precision, scene, seen) for seen in views]
     assert not same(*expected)
-    renderer = SplatRenderer(gl, precision)
-    renderer.set_scene(scene)
-    renderer.ask(question(scene))
+    renderer = show(scene, precision, asked=question(scene))
     for index in (0, 1, 0):
         renderer.draw(views[1 - index], weight_maps=weight_maps)
         renderer.draw(views[index], weight_maps=weight_maps)
         assert same(everything(renderer), expected[index])
     agree(renderer.frame(True), render(scene, views[0]), precision, steps=4)
-    renderer.release()
 
 
-def test_a_resize_between_the_passes_of_a_frame(gl, precision):
+def test_a_resize_between_the_passes_of_a_frame(gl, show, precision):
     scene = all_around()
     small, wide = camera(20, 16, 20.0), camera(50, 9, 30.0)
     expected = {seen.width: fresh(gl, precision, scene, seen) for seen in (small, wide)}
-    renderer = SplatRenderer(gl, precision)
-    renderer.set_scene(scene)
-    renderer.ask(question(scene))
+    renderer = show(scene, precision, asked=question(scene))
     for first, then in ((small, wide), (wide, small), (small, wide)):
         renderer.draw(first, weight_maps=False)
         renderer.draw(then, weight_maps=False)
@@ -704,7 +687,6 @@ def test_a_resize_between_the_passes_of_a_frame(gl, precision):
         assert same(everything(renderer), expected[first.width])
         renderer.draw(then, weight_maps=False)
         assert same(everything(renderer), expected[then.width])
-    renderer.release()
 
 
 def test_the_context_goes_while_the_renderer_lives(gl, precision):

@@ -8,6 +8,7 @@ import pytest
 import torch
 from torch.nn.functional import interpolate
 
+from app.bench.cases import in_float64
 from app.gl import SplatRenderer, paints
 from app.gl.hardware import CARD, PROCESSOR, hardware_of
 from app.gl.layered import KEPT, MOVING, LayeredLevel, half
@@ -94,16 +95,6 @@ def views_of(scene: Scene) -> torch.Tensor:
     return scene.view_ids
 
 
-def doubled(scene: Scene) -> Scene:
-    semantics = scene.semantics
-    values, atoms = semantics.weight_values.double(), semantics.dictionary.double()
-    return replace(
-        scene,
-        gaussians=scene.gaussians.map(lambda v: v.double()),
-        semantics=replace(semantics, weight_values=values, dictionary=atoms),
-    )
-
-
 @pytest.fixture
 def quick(gl, precision):
     """Moves as a processor does, wherever this runs."""
@@ -113,16 +104,14 @@ def quick(gl, precision):
 
 
 @pytest.mark.parametrize("num_views", NUM_VIEWS)
-def test_a_picture_is_blended_as_the_reference_has_it(gl, precision, num_views):
+def test_a_picture_is_blended_as_the_reference_has_it(show, precision, num_views):
     scene, seen = layered(num_views), between(num_views)
-    expected = compose.render(doubled(scene), seen, background=(0.2, 0.4, 0.9))
-    fused = reference.render(doubled(scene), seen, background=(0.2, 0.4, 0.9))
+    expected = compose.render(in_float64(scene), seen, background=(0.2, 0.4, 0.9))
+    fused = reference.render(in_float64(scene), seen, background=(0.2, 0.4, 0.9))
     assert num_views == 1 or psnr(fused.rgb, expected.rgb) < 35, "blending must be another picture"
-    renderer = SplatRenderer(gl, precision)
-    renderer.set_scene(scene)
+    renderer = show(scene, precision)
     renderer.draw(seen, background=(0.2, 0.4, 0.9))
     frame = renderer.frame(weight_maps=True)
-    renderer.release()
     assert expected.alphas.mean() > 0.5
     assert psnr(frame.rgb, expected.rgb) >= PSNR[precision]
     assert psnr(frame.alphas, expected.alphas) >= PSNR[precision]
@@ -133,7 +122,7 @@ def test_a_picture_is_blended_as_the_reference_has_it(gl, precision, num_views):
     assert (maps_of(frame).sum(-1) - expected.alphas).abs().mean() <= 10 * WEIGHT_ERROR[precision]
 
 
-def test_maps_drawn_in_cells_are_those_drawn_whole(gl, precision):
+def test_maps_drawn_in_cells_are_those_drawn_whole(gl, show, precision):
     """To the bit: in other cells every weight of an atom is 0. A layer beside the picture, too."""
     if not draws_in_software(gl):
         pytest.skip("a graphics card draws whole maps")
@@ -143,28 +132,24 @@ def test_maps_drawn_in_cells_are_those_drawn_whole(gl, precision):
     for each in (scene, beside.rows(views_of(scene) >= 0)):
         drawn = []
         for maps in (CellMaps, WeightMaps):
-            renderer = SplatRenderer(gl, precision, hardware=replace(PROCESSOR, maps=maps))
-            renderer.set_scene(each)
+            renderer = show(each, precision, hardware=replace(PROCESSOR, maps=maps))
             renderer.draw(between(3))
             drawn.append(maps_of(renderer.frame(weight_maps=True)))
-            renderer.release()
         assert torch.equal(*drawn) and drawn[0].amax((0, 1)).min() > 0
 
 
 @pytest.mark.parametrize("num_views", NUM_VIEWS)
 @pytest.mark.usefixtures("queries")
-def test_relevance_of_the_blend_is_the_references(gl, precision, num_views):
+def test_relevance_of_the_blend_is_the_references(show, precision, num_views):
     scene, seen = layered(num_views), between(num_views)
-    expected = maps_of(compose.render(doubled(scene), seen))
-    renderer = SplatRenderer(gl, precision)
-    renderer.set_scene(scene)
+    expected = maps_of(compose.render(in_float64(scene), seen))
+    renderer = show(scene, precision)
     renderer.draw(seen)
     for mode in ("relevancy", "cosine"):
         compiled = question(scene, 5, mode)
         renderer.ask(compiled)
         error = (renderer.relevance() - full_relevance(scene, compiled, expected)).abs()
         assert error.mean() <= RELEVANCE_ERROR[precision]
-    renderer.release()
 
 
 def test_what_layers_count_is_in_sum_one_or_more_where_anything_shows(renderer):
@@ -214,7 +199,7 @@ def test_marks_hide_and_tint_in_every_layer(renderer, num_views):
     renderer.mark(shown, none)
     renderer.draw(seen)
     frame = renderer.frame(weight_maps=True)
-    expected = compose.render(doubled(scene.rows(torch.from_numpy(shown))), seen)
+    expected = compose.render(in_float64(scene.rows(torch.from_numpy(shown))), seen)
     # Other Gaussians tell another median distance, by some percent: what layers count changes as much.
     assert psnr(frame.rgb, expected.rgb) >= 45 and psnr(frame.alphas, expected.alphas) >= 45
     renderer.mark(np.ones(len(shown), bool), none)
@@ -228,7 +213,7 @@ def test_marks_hide_and_tint_in_every_layer(renderer, num_views):
     assert float((blue.rgb[..., 2] - blue.rgb[..., 0]).mean()) > 0.1
 
 
-def test_changes_reach_every_layer(gl):
+def test_changes_reach_every_layer(show):
     """Also those that come into view after them."""
     scene, seen = layered(6), between(6)
     chosen = torch.arange(len(scene.gaussians)) % 3 == 0
@@ -237,33 +222,29 @@ def test_changes_reach_every_layer(gl):
         Recoloured.tint(Mask.of(~chosen.numpy()), (1.0, 0.0, 0.0), 0.5, 0.5),
     )
     expected = compose.render(
-        doubled(replace(scene, gaussians=apply_changes(scene.gaussians, changes))), seen
+        in_float64(replace(scene, gaussians=apply_changes(scene.gaussians, changes))), seen
     )
-    renderer = SplatRenderer(gl, "float32")
-    renderer.set_scene(scene)
+    renderer = show(scene, "float32")
     renderer.draw(replace(seen, viewmat=scene.viewmats[0].double()))
     renderer.change(changes)
     renderer.draw(seen)
     assert psnr(renderer.frame().rgb, expected.rgb) >= PSNR["float32"]
     renderer.change(())
     renderer.draw(seen)
-    assert psnr(renderer.frame().rgb, compose.render(doubled(scene), seen).rgb) >= PSNR["float32"]
-    renderer.release()
+    assert psnr(renderer.frame().rgb, compose.render(in_float64(scene), seen).rgb) >= PSNR["float32"]
 
 
-def test_pictures_are_continuous_where_another_layer_comes_in(gl):
+def test_pictures_are_continuous_where_another_layer_comes_in(show):
     """Steps of a walk along six photos: where the nearest four change, by no more than elsewhere."""
     scene = layered(6)
     nearness = Nearness.of(scene)
     places = np.linspace(1.2, 3.8, 105)
     seen = [camera(48, 40, 40.0, turned(0.04 * p, (-0.12 * p, 0.02, 0.03))) for p in places]
-    renderer = SplatRenderer(gl, "float32")
-    renderer.set_scene(scene)
+    renderer = show(scene, "float32")
     pictures = []
     for each in seen:
         renderer.draw(each, weight_maps=False)
         pictures.append(renderer.frame().rgb.double().numpy())
-    renderer.release()
     steps = np.abs(np.diff(pictures, axis=0)).mean((1, 2, 3))
     chosen = [frozenset(nearness.chosen(each).views) for each in seen]
     changes = np.array([one != other for one, other in pairwise(chosen)])
@@ -320,14 +301,13 @@ def walls(num_views: int) -> Scene:
     return replace(scene, gaussians=gaussians, view_ids=ids, viewmats=poses)
 
 
-def test_no_picture_jumps_on_a_walk(gl):
+def test_no_picture_jumps_on_a_walk(gl, show):
     """From the first of six photos to the last, moving: where another layer becomes the nearest, or comes in,
     no step is larger than what a walk at rest moves, by as much as those vary among themselves."""
     scene = walls(6)
     places = np.linspace(0.0, 5.0, 101)
     seen = [camera(64, 48, 50.0, turned(0.0, (-0.12 * p, 0.0, 0.0))) for p in places]
-    renderer = SplatRenderer(gl, "float32", hardware=replace(hardware_of(gl), blends_all=False))
-    renderer.set_scene(scene)
+    renderer = show(scene, "float32", hardware=replace(hardware_of(gl), blends_all=False))
     steps = {}
     for moving in (True, False):
         pictures = []
@@ -335,7 +315,6 @@ def test_no_picture_jumps_on_a_walk(gl):
             renderer.draw(each, weight_maps=False, moving=moving)
             pictures.append(renderer.frame().rgb.double().numpy())
         steps[moving] = np.abs(np.diff(pictures, axis=0)).mean((1, 2, 3))
-    renderer.release()
     nearness = Nearness.of(scene)
     nearest = [nearness.chosen(each, MOVING).views[0] for each in seen]
     assert sum(one != other for one, other in pairwise(nearest)) == 5
@@ -373,21 +352,19 @@ def test_a_moving_picture_is_blended_of_two(quick, precision, num_views, size, h
     quick.draw(seen, fast=how == "fast", share=share, moving=how == "moving", weight_maps=False)
     moving, blended = quick.frame(), num_views > 1
     assert quick.passes["colour"] == 1 + blended and quick.passes["blend"] == blended
-    expected = moving_twin(doubled(thin_with_rows(scene, share)[0]), seen)
+    expected = moving_twin(in_float64(thin_with_rows(scene, share)[0]), seen)
     assert psnr(moving.rgb, expected.rgb) >= PSNR[precision]
     assert psnr(moving.alphas, expected.alphas) >= PSNR[precision]
     quick.draw(seen, weight_maps=False)
     assert not blended or psnr(quick.frame().rgb, moving.rgb) < 40, "at rest it is another picture"
 
 
-def test_numbers_of_a_moving_picture_are_exact_where_all_mean_the_same(gl):
+def test_numbers_of_a_moving_picture_are_exact_where_all_mean_the_same(gl, show):
     scene, seen = layered(3), between(3)
     ids = torch.full_like(scene.semantics.weight_ids, 2)
     scene = replace(scene, semantics=replace(scene.semantics, weight_ids=ids))
     compiled = question(scene, 2)
-    renderer = SplatRenderer(gl, "float32", hardware=replace(hardware_of(gl), blends_all=False))
-    renderer.set_scene(scene)
-    renderer.ask(compiled)
+    renderer = show(scene, "float32", hardware=replace(hardware_of(gl), blends_all=False), asked=compiled)
     renderer.draw(seen, fast=True)
     renderer.carry()
     fast = renderer.relevance()
@@ -397,30 +374,26 @@ def test_numbers_of_a_moving_picture_are_exact_where_all_mean_the_same(gl):
     both = (fast > 0).all(0) & (exact > 0).all(0)
     assert both.float().mean() > 0.5
     assert (fast - exact)[:, both].abs().max() <= 1e-5  # float32 and a sigmoid
-    renderer.release()
 
 
 @pytest.mark.parametrize("num_views", NUM_VIEWS)
-def test_on_a_card_a_moving_picture_is_blended_too(gl, precision, num_views):
+def test_on_a_card_a_moving_picture_is_blended_too(show, precision, num_views):
     """Its numbers by the same shares: the sum of W g over that of W |f|, both of the reference's blend."""
     scene, seen = layered(num_views), between(num_views)
     compiled = question(scene, 4)
-    renderer = SplatRenderer(gl, precision, hardware=CARD)
-    renderer.set_scene(scene)
-    renderer.ask(compiled)
+    renderer = show(scene, precision, hardware=CARD, asked=compiled)
     renderer.draw(seen, fast=True)
     layers = len(Nearness.of(scene).chosen(seen).views)
     assert renderer.passes["colour"] == layers and not renderer.passes["weights"]
     error = (renderer.relevance() - twin(scene, compiled, seen)).abs()
     # As in test_gl_fast.py: a step or two are lost in the mean, here also where layers are added.
     assert error.mean() <= 4 * STEP[precision] + 1e-6
-    expected = compose.render(doubled(scene), seen)
+    expected = compose.render(in_float64(scene), seen)
     assert psnr(renderer.frame().rgb, expected.rgb) >= PSNR[precision]
     renderer.draw(seen)
     assert renderer.passes["colour"] == layers, "the colours are those at rest"
     maps = renderer.frame(weight_maps=True).weight_maps
     assert maps is not None and (maps - maps_of(expected)).abs().mean() <= WEIGHT_ERROR[precision]
-    renderer.release()
 
 
 def test_numbers_are_made_once_a_layer(quick, monkeypatch):
@@ -439,18 +412,15 @@ def test_numbers_are_made_once_a_layer(quick, monkeypatch):
 
 
 @pytest.mark.parametrize("size", [(96, 80), (95, 79)], ids=["even", "odd"])
-def test_more_phrases_than_fit_are_asked_of_what_moves(gl, size):
+def test_more_phrases_than_fit_are_asked_of_what_moves(gl, show, size):
     """Weight maps blended of two layers."""
     scene, seen = layered(3), between(3).with_size(*size)
     compiled = question(scene, 40)
-    renderer = SplatRenderer(gl, "float32", hardware=replace(hardware_of(gl), blends_all=False))
-    renderer.set_scene(scene)
-    renderer.ask(compiled)
+    renderer = show(scene, "float32", hardware=replace(hardware_of(gl), blends_all=False), asked=compiled)
     renderer.draw(seen, fast=True)
-    maps = maps_of(moving_twin(doubled(scene), seen, weight_maps=True))
+    maps = maps_of(moving_twin(in_float64(scene), seen, weight_maps=True))
     error = (renderer.relevance() - full_relevance(scene, compiled, maps)).abs()
     assert error.mean() <= RELEVANCE_ERROR["float32"]
-    renderer.release()
 
 
 def test_at_rest_after_moving_is_as_before(quick):
@@ -479,14 +449,14 @@ def test_pictures_for_films_are_those_on_show(renderer):
     renderer.colours(replace(seen, viewmat=scene.viewmats[0].double()))
     renderer.draw(seen)
     assert torch.equal(renderer.frame().rgb, first), "what a film drew between is not taken for this picture"
-    relevant = compose.render(doubled(scene), seen)
+    relevant = compose.render(in_float64(scene), seen)
     assert (maps_of(renderer.frame(weight_maps=True)) - maps_of(relevant)).abs().mean() <= 2e-3
 
 
 @pytest.mark.parametrize("num_views", NUM_VIEWS)
 def test_a_still_picture_agrees_with_the_reference(num_views):
     scene, seen = layered(num_views), between(num_views)
-    still, expected = draw_still(scene, seen, threads=2), compose.render(doubled(scene), seen)
+    still, expected = draw_still(scene, seen, threads=2), compose.render(in_float64(scene), seen)
     # As in processor/test_still.py: colours and weights are kept as float16.
     assert psnr(still.frame.rgb, expected.rgb) >= 60 and still.maps is not None
     assert (still.maps.weights.double() - maps_of(expected)).abs().mean() < 2e-4
@@ -501,23 +471,21 @@ def test_a_still_picture_of_two_layers_is_blended_of_the_nearest():
     scene, seen = layered(6), between(6)
     still = draw_still(scene, seen, most=2)
     chosen = Nearness.of(scene).chosen(seen, 2)
-    frames = [reference.render(doubled(scene).layer(view), seen) for view in chosen.views]
+    frames = [reference.render(in_float64(scene).layer(view), seen) for view in chosen.views]
     expected = compose.blend_layers(frames, chosen.weights)
     assert psnr(still.frame.rgb, expected.rgb) >= 60 and still.maps is not None  # as above
     assert (still.maps.weights.double() - maps_of(expected)).abs().mean() < 2e-4
-    assert psnr(compose.render(doubled(scene), seen).rgb, expected.rgb) < 40
+    assert psnr(compose.render(in_float64(scene), seen).rgb, expected.rgb) < 40
 
 
-def test_a_still_picture_is_the_renderers_marked(gl):
+def test_a_still_picture_is_the_renderers_marked(show):
     scene, seen = layered(3), between(3)
     random, count = np.random.default_rng(0), len(scene.gaussians)
     marks = random.random(count) < 0.7, random.integers(0, 3, count).astype(np.uint8)
-    renderer = SplatRenderer(gl)
-    renderer.set_scene(scene)
+    renderer = show(scene)
     renderer.mark(*marks)
     renderer.draw(seen)
     own, span = renderer.frame(weight_maps=True), renderer.depth_range
-    renderer.release()
     still = draw_still(scene, seen, marks=marks)
     assert psnr(still.frame.rgb, own.rgb) >= 50 and still.maps is not None
     assert (still.maps.weights - maps_of(own)).abs().mean() < 2e-3
@@ -586,10 +554,9 @@ def test_pictures_of_single_layers_of_one_size_are_kept(renderer):
     assert torch.equal(again.rgb, first.rgb) and torch.equal(maps_of(again), maps_of(first))
 
 
-def test_a_photo_sees_its_own_layer(gl):
+def test_a_photo_sees_its_own_layer(show):
     scene = layered(3)
-    renderer = SplatRenderer(gl, "float32")
-    renderer.set_scene(scene)
+    renderer = show(scene, "float32")
     renderer.draw(between(3))
     paints.trust(renderer, False)
     paints.trust(renderer, True)
@@ -599,7 +566,6 @@ def test_a_photo_sees_its_own_layer(gl):
     assert photos is live.photo_depths(True)
     width, height, count = photos.texture.size
     drawn = np.frombuffer(photos.texture.read(), np.float32).reshape(count, height, width)
-    renderer.release()
     for view in range(3):
         frame = reference.render(scene.layer(view), scene.camera(view), weight_maps=False)
         sure = np.abs(frame.alphas.numpy() - 0.5) > 1e-3
@@ -628,6 +594,6 @@ def test_layers_that_show_nothing(renderer, what):
     renderer.draw(seen, fast=True)
     assert torch.isfinite(renderer.relevance()).all()
     renderer.draw(seen)
-    frame, expected = renderer.frame(weight_maps=True), compose.render(doubled(scene), seen)
+    frame, expected = renderer.frame(weight_maps=True), compose.render(in_float64(scene), seen)
     assert psnr(frame.rgb, expected.rgb) >= 50 and torch.isfinite(renderer.relevance()).all()
     assert psnr(draw_still(scene, seen).frame.rgb, expected.rgb) >= 50

@@ -7,15 +7,12 @@ from dataclasses import replace
 from functools import partial
 from pathlib import Path
 
-import numpy as np
 import pytest
 
 from app.cli.renderers import open_renderer
 from app.gl import SplatRenderer, offscreen_context, paints
 from app.gl.canvas import Canvas
-from app.gl.carried import atom_bits
 from app.gl.hardware import hardware_of
-from app.gl.ordering import stable_order
 from app.gl.targets import gl_function
 from langflash_core.errors import GraphicsError
 from langflash_core.types import Scene
@@ -210,22 +207,6 @@ def test_nothing_is_forgotten_but_what_is_asked_for(gl, queries):
 def test_precision_has_two_names(gl):
     with pytest.raises(ValueError, match="float16 or float32"):
         SplatRenderer(gl, "float8")  # pyright: ignore[reportArgumentType]
-
-
-def test_the_fast_sort_is_stable():
-    rng = np.random.default_rng(0)
-    keys = rng.integers(0, 50, 5000).astype(np.float64)
-    np.testing.assert_array_equal(stable_order(keys), np.argsort(keys, kind="stable"))
-    for few in ([], [1.0], [2.0, 1.0], [0.0, 1e-300, 0.0, 1e300]):
-        np.testing.assert_array_equal(stable_order(np.array(few)), np.argsort(np.array(few), kind="stable"))
-
-
-def test_atom_bits():
-    ids = np.array([[0, 63, 64], [129, 5, 5], [7, 8, 9]])
-    values = np.array([[0.5, 0.5, 0.0], [0.2, 0.4, 0.4], [0.0, 0.0, 0.0]])
-    bits = atom_bits(ids, values, 130)
-    carried = [[k for k in range(192) if int(row[k // 64]) >> (k % 64) & 1] for row in bits]
-    assert carried == [[0, 63], [5, 129], []]
 
 
 @pytest.mark.parametrize("blends_all", [True, False])

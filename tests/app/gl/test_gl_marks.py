@@ -95,19 +95,3 @@ def test_nothing_shown_is_an_empty_picture(renderer, scene):
     renderer.draw(camera())
     assert not renderer.frame(weight_maps=True).alphas.any()
     assert renderer.pixel(4, 4)[2].sum() == 0
-
-
-@pytest.mark.parametrize("before", [True, False], ids=["level first", "marks first"])
-def test_marks_reach_thinned_levels(renderer, before):
-    scene = cloud(COUNT, num_atoms=3, dtype=torch.float32)
-    renderer.set_scene(scene)
-    seen = camera(48, 40, 40.0)
-    if before:
-        renderer.draw(seen, share=0.5)
-    renderer.mark(np.zeros(COUNT, bool), no_tints())
-    renderer.draw(seen, share=0.5)
-    assert not renderer.frame().alphas.any()
-    renderer.mark(np.ones(COUNT, bool), np.ones(COUNT, np.uint8))
-    renderer.draw(seen, share=0.5)
-    blue = renderer.frame().rgb
-    assert float((blue[..., 2] - blue[..., 0]).mean()) > 0.1

@@ -10,7 +10,7 @@ from app.gl import SplatRenderer, paints
 from langflash_core.export.png import glow_share
 from langflash_core.scene.gaps import fill_gaps
 from langflash_core.scene.trust import fade_untrusted
-from langflash_core.types import LUMA
+from langflash_core.types import LUMA, Scene
 from tests.app.gl.questions import question
 from tests.splat.scenes import camera, cloud, maps_of, parallel, scene_of, splats
 
@@ -29,6 +29,15 @@ def asked(renderer):
     renderer.draw(camera(), background=(0.0, 0.5, 1.0))
     renderer.ask(question(scene, 5))
     return renderer
+
+
+def photographed(asked: SplatRenderer) -> Scene:
+    """The scene, of which it is known that the first photo made it."""
+    scene = dataclasses.replace(
+        cloud(1500, 12, dtype=torch.float32), view_ids=torch.zeros(1500, dtype=torch.int64)
+    )
+    asked.set_scene(scene)
+    return scene
 
 
 def test_rgb_is_the_frame(asked):
@@ -175,10 +184,7 @@ def test_what_is_missing_is_named(renderer):
 
 @pytest.mark.parametrize(("aside", "flat"), [(0.0, False), (0.6, False), (1.6, False), (0.6, True)])
 def test_faded_is_the_frame_fading_over_the_background(asked, aside, flat):
-    scene = dataclasses.replace(
-        cloud(1500, 12, dtype=torch.float32), view_ids=torch.zeros(1500, dtype=torch.int64)
-    )
-    asked.set_scene(scene)
+    scene = photographed(asked)
     shot, background = camera(), torch.tensor((0.0, 0.5, 1.0))
     viewmat = shot.viewmat.clone()
     viewmat[0, 3] -= aside * scene.gaussians.means[:, 2].mean()
@@ -210,10 +216,7 @@ def from_aside():
 
 @pytest.mark.parametrize("fading", [False, True])
 def test_gaps_are_filled_as_the_twin_does(asked, fading):
-    scene = dataclasses.replace(
-        cloud(1500, 12, dtype=torch.float32), view_ids=torch.zeros(1500, dtype=torch.int64)
-    )
-    asked.set_scene(scene)
+    scene = photographed(asked)
     shot, background = from_aside(), torch.tensor((0.0, 0.5, 1.0))
     asked.draw(shot)
     frame = asked.frame()
@@ -235,10 +238,7 @@ def test_gaps_are_filled_as_the_twin_does(asked, fading):
 
 @pytest.mark.parametrize(("fade", "fill"), [(False, True), (True, False), (True, True)])
 def test_pictures_one_after_the_other_fade_and_fill_as_on_show(asked, fade, fill):
-    scene = dataclasses.replace(
-        cloud(1500, 12, dtype=torch.float32), view_ids=torch.zeros(1500, dtype=torch.int64)
-    )
-    asked.set_scene(scene)
+    photographed(asked)
     colours = asked.colours(from_aside(), fade=fade, fill=fill)
     asked.draw(from_aside())
     asked.fill(fill)

@@ -254,10 +254,9 @@ def test_late_pictures_are_close_and_resting_ones_exact(both, many, monkeypatch)
     assert late.depth_range == true.depth_range
 
 
-def test_what_a_late_order_brings_behind_the_camera_is_not_drawn(gl):
+def test_what_a_late_order_brings_behind_the_camera_is_not_drawn(show):
     scene = cloud(60, 2, dtype=torch.float32)
-    renderer = SplatRenderer(gl, "float32")
-    renderer.set_scene(scene)
+    renderer = show(scene, "float32")
     seen = camera()
     past = along(seen, 1e3)
     assert renderer._scene is not None
@@ -268,4 +267,3 @@ def test_what_a_late_order_brings_behind_the_camera_is_not_drawn(gl):
     part.splats.project(past)
     renderer.draw(past, weight_maps=False)
     assert float(renderer.frame().alphas.max()) == 0
-    renderer.release()

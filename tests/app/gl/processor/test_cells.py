@@ -44,16 +44,6 @@ def test_cells_hold_what_whole_maps_hold(gl, software, num_atoms, twice):
     assert torch.equal(mine, true)
 
 
-def test_cells_are_drawn_as_quads_where_a_splat_is_too_large(gl, software):
-    scene = local(30)
-    scales = scene.gaussians.scales.clone()
-    scales[0] = 1e3
-    scene = replace(scene, gaussians=replace(scene.gaussians, scales=scales))
-    view = camera(200, 150, 170.0)
-    mine, true = drawn(gl, scene, view), drawn(gl, scene, view, CARD)
-    assert not mine[2] and torch.equal(mine[0][3], true[0][3])
-
-
 def test_maps_are_drawn_whole_where_too_many_splats_reach_too_many_cells(gl, software, monkeypatch):
     scene, view = local(30), camera(200, 150, 170.0)
     boxes = np.tile(np.array([[0.0], [0.0], [130.0], [100.0]], np.float32), 200)

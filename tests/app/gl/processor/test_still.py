@@ -50,10 +50,8 @@ def test_a_still_picture_agrees_with_the_reference(scene) -> None:
 
 
 @pytest.mark.parametrize("what", ["rgb", "heat", "label", "atom", "feature", "depth", "weight"])
-def test_a_renderer_shows_it_as_its_own(gl, scene, what: str) -> None:
-    renderer = SplatRenderer(gl)
-    renderer.set_scene(scene)
-    renderer.ask(question(scene, 2))
+def test_a_renderer_shows_it_as_its_own(show, scene, what: str) -> None:
+    renderer = show(scene, asked=question(scene, 2))
 
     def shown() -> np.ndarray:
         paint = {
@@ -77,7 +75,6 @@ def test_a_renderer_shows_it_as_its_own(gl, scene, what: str) -> None:
     # A threshold, or the depth's range, that a pixel lies just beside: few pixels differ by more.
     # What lies just beside the image counts for OpenGL's range of depths, and moves its colours a little.
     assert np.mean(different > (8 if what == "depth" else STEP)) < 0.02
-    renderer.release()
 
 
 def test_a_large_scene_is_projected_in_parts_to_the_same_picture(scene, monkeypatch) -> None:
@@ -111,29 +108,25 @@ def test_what_lies_beside_the_picture_is_not_looked_at(scene, monkeypatch) -> No
     assert len(looked) == 2 and looked[0] == looked[1] <= len(gaussians)
 
 
-def test_it_is_drawn_as_marked(gl, scene) -> None:
+def test_it_is_drawn_as_marked(show, scene) -> None:
     random = np.random.default_rng(0)
     marks = random.random(COUNT) < 0.7, random.integers(0, 3, COUNT).astype(np.uint8)
-    renderer = SplatRenderer(gl)
-    renderer.set_scene(scene)
+    renderer = show(scene)
     renderer.mark(*marks)
     renderer.draw(SEEN)
     own = renderer.frame()
-    renderer.release()
     still = draw_still(scene, SEEN, marks=marks, weight_maps=False)
     assert still.maps is None and psnr(still.frame.rgb, own.rgb) >= 50
 
 
-def test_pixels_of_it_can_be_read(gl, scene) -> None:
-    renderer = SplatRenderer(gl)
-    renderer.set_scene(scene)
+def test_pixels_of_it_can_be_read(show, scene) -> None:
+    renderer = show(scene)
     still = draw_still(scene, SEEN)
     renderer.bring(still)
     alpha, depth, weights = renderer.pixel(40, 30)
     assert alpha == pytest.approx(float(still.frame.alphas[30, 40]), abs=1e-6)
     assert depth == pytest.approx(float(still.frame.depths[30, 40]), abs=1e-5)
     assert weights is not None and weights.sum() == pytest.approx(alpha, abs=5e-3)
-    renderer.release()
 
 
 def test_an_answer_is_computed_once(scene) -> None:
@@ -181,9 +174,9 @@ def test_a_scene_that_comes_before_all_shaders_leaves_nothing_of_the_warm_up(gl)
     assert buffers() == before and gl.error == "GL_NO_ERROR"
 
 
-def test_shaders_are_compiled_ahead(gl, scene) -> None:
+def test_shaders_are_compiled_ahead(gl, show, scene) -> None:
     """What comes first in a window finds its programs made: one at a time, a frame between two of them."""
-    renderer = SplatRenderer(gl)
+    renderer = show(None)
     programs = renderer.canvas.painter.programs._made
     counts = [0]
     for _ in warm_up(renderer.canvas):
@@ -214,7 +207,6 @@ def test_shaders_are_compiled_ahead(gl, scene) -> None:
     assert set(programs) == before
     assert SIDE & (SIDE - 1)  # of textures with such sides Mesa compiles shaders of their own
     assert gl.error == "GL_NO_ERROR"
-    renderer.release()
 
 
 def test_what_blends_layers_is_compiled_ahead_alone(gl) -> None:
@@ -232,15 +224,13 @@ def test_what_blends_layers_is_compiled_ahead_alone(gl) -> None:
     assert buffers() == before and gl.error == "GL_NO_ERROR"
 
 
-def test_weight_maps_of_one_size_are_kept(gl, scene) -> None:
-    renderer = SplatRenderer(gl)
-    renderer.set_scene(scene)
+def test_weight_maps_of_one_size_are_kept(show, scene) -> None:
+    renderer = show(scene)
     first, second = (scene.camera(0, *size) for size in ((64, 48), (48, 36)))
     before = renderer_maps(renderer, first)
     renderer.draw(second)
-    assert [view.maps.layers._made is None for view in renderer._canvas._views] == [True, False]
+    assert [view.maps.layers._made is None for view in renderer.canvas._views] == [True, False]
     assert np.array_equal(renderer_maps(renderer, first), before)
-    renderer.release()
 
 
 def renderer_maps(renderer: SplatRenderer, camera) -> np.ndarray:
@@ -250,13 +240,11 @@ def renderer_maps(renderer: SplatRenderer, camera) -> np.ndarray:
     return maps.numpy()
 
 
-def test_what_is_on_show_stays_while_another_size_is_drawn(gl, scene) -> None:
+def test_what_is_on_show_stays_while_another_size_is_drawn(show, scene) -> None:
     """A window shows the picture before until the next one is painted."""
-    renderer = SplatRenderer(gl)
-    renderer.set_scene(scene)
+    renderer = show(scene)
     renderer.draw(SEEN, weight_maps=False)
     shown = renderer.rgb_texture
     before = pixels(shown)
     renderer.draw(SEEN.with_size(48, 40), weight_maps=False)
     assert np.array_equal(pixels(shown), before)
-    renderer.release()
