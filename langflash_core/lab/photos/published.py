@@ -18,20 +18,8 @@ from torch import Tensor
 from langflash_core.base.picture_files import opened_picture
 from langflash_core.errors import InputError
 from langflash_core.images.decode import read_photo
-from langflash_core.lab.photos.folder import (
-    MILLIMETRE,
-    Name,
-    PhotoFolder,
-    camera_matrix,
-    order,
-    read_map,
-)
-from langflash_core.lab.photos.layouts import (
-    KINECT_CAMERA,
-    NYU_CAMERA,
-    NYU_FRAME,
-    forty_classes,
-)
+from langflash_core.lab.photos.folder import MILLIMETRE, Name, PhotoFolder, camera_matrix, order, read_map
+from langflash_core.lab.photos.layouts import KINECT_CAMERA, NYU_CAMERA, NYU_FRAME, forty_classes
 from langflash_core.lab.photos.matlab import MatFile, open_mat
 from langflash_core.lab.photos.names import CLASSES40, class_of, spoken
 from langflash_core.lab.photos.reading import read_table

@@ -15,13 +15,7 @@ import torch
 from scipy.ndimage import distance_transform_edt
 from torch import Tensor
 
-from langflash_core.lab.rooms import (
-    TRAIN_LIBRARIES,
-    Pack,
-    RoomRenderer,
-    RoomViews,
-    render_room,
-)
+from langflash_core.lab.rooms import TRAIN_LIBRARIES, Pack, RoomRenderer, RoomViews, render_room
 from langflash_core.lab.training.shards import NOTHING, Label, RoomRecord, quantise_tokens, write_shard
 from langflash_core.network.encoders.shared import Encoder
 from langflash_core.network.precision import mixed_precision
