@@ -111,23 +111,13 @@ def test_the_truth_scores_as_the_truth(folder: PhotoFolder, monkeypatch):
     two, four = row["photos"]["2"], row["photos"]["4"]
     assert walk.name == "001-007" and list(two["frames"]) == list(four["frames"]) == ["1", "5"]
     for scene in (two, four):
-        assert (
-            scene["placed"] == 1
-            and scene["places"] < 1e-4
-            and scene["rotation"] < 1e-2
-            and scene["focal"] == 0
-        )
-        assert (
-            scene["depth_abs_rel"] < 1e-3
-            and scene["depth_delta1"] == 1
-            and scene["length"] == pytest.approx(0.36)
-        )
+        assert scene["placed"] == 1 and scene["places"] < 1e-4 and scene["rotation"] < 1e-2
+        assert scene["focal"] == 0
+        assert scene["depth_abs_rel"] < 1e-3 and scene["depth_delta1"] == 1
+        assert scene["length"] == pytest.approx(0.36)
         for numbers in scene["frames"].values():
-            assert (
-                numbers["psnr_covered"] > 20
-                and numbers["large_psnr_covered"] > 18
-                and numbers["depth"] < 1e-3
-            )
+            assert numbers["psnr_covered"] > 20 and numbers["large_psnr_covered"] > 18
+            assert numbers["depth"] < 1e-3
     assert four["gaussians"] == 2 * two["gaussians"]
     # Own photos are made once each, and those of a scene of two are that scene.
     assert sorted(map(tuple, made)) == sorted(
@@ -221,10 +211,8 @@ def test_walks_are_kept_and_told_beside_each_other(folder: PhotoFolder, monkeypa
     assert run_walks(posed_walks(folder, plan, 2), 2, BENCH, shelf=shelf) == before and len(made) == count
     assert before["by_photos"]["3"]["walks"] == 2 and before["by_photos"]["3"]["placed"] == 1
     table = markdown(tables(before))
-    assert (
-        "| mean of 2 walks | 2 photos | 3 photos |" in table
-        and "| photos placed (%) | 100.00 | 100.00 |" in table
-    )
+    assert "| mean of 2 walks | 2 photos | 3 photos |" in table
+    assert "| photos placed (%) | 100.00 | 100.00 |" in table
     after = json.loads(json.dumps(before))
     for row, change in zip(after["cases"], (1.0, 2.0), strict=True):
         for frame in row["photos"]["3"]["frames"].values():

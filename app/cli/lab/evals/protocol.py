@@ -1,4 +1,7 @@
-"""`langflash lab eval protocol`: a published data set, judged as papers judge it."""
+"""`langflash lab eval protocol`: a published data set, judged as papers judge it.
+
+All raise `LangFlashError` where what is judged, the checkpoint or the output cannot be used.
+"""
 
 from argparse import Namespace
 from itertools import islice
@@ -19,11 +22,7 @@ if TYPE_CHECKING:
 
 
 def protocol(args: Namespace, out: TextIO) -> None:
-    """Judge a checkpoint on a data set where it lies.
-
-    Raises:
-        LangFlashError: data set, checkpoint or output cannot be used.
-    """
+    """Judge a checkpoint on a data set where it lies."""
     check_files(args)
     if args.work is not None:
         check_folder(args.work, "--work")
@@ -47,11 +46,7 @@ def protocol(args: Namespace, out: TextIO) -> None:
 
 
 def _nyu(args: Namespace, out: TextIO) -> None:
-    """Single photos, as `eval photos-labelled` judges them.
-
-    Raises:
-        LangFlashError: an option that single photos have no use for, or what `protocol` says.
-    """
+    """Single photos, as `eval photos-labelled` judges them."""
     for name in ("index", "lpips", "align"):
         if getattr(args, name):
             raise InputError(f"nyu judges photos one by one, without another view; leave --{name} out")

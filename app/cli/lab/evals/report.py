@@ -1,4 +1,7 @@
-"""`langflash lab eval report`: everything that is at hand, judged and put on one page."""
+"""`langflash lab eval report`: everything that is at hand, judged and put on one page.
+
+All raise `LangFlashError` where what is judged, the checkpoint or the output cannot be used.
+"""
 
 import shlex
 import sys
@@ -32,11 +35,7 @@ WORK = "work"
 
 
 def report(args: Namespace, out: TextIO) -> None:
-    """Write report.html, .md, .json and .csv.
-
-    Raises:
-        LangFlashError: there is nothing to judge, or a source, the checkpoint or the output cannot be used.
-    """
+    """Write report.html, .md, .json and .csv."""
     from langflash_core.lab.evaluation import report_page
     from langflash_core.lab.evaluation.report import PUBLISHED, Workplace, plans
     from langflash_core.lab.evaluation.tallies import identity

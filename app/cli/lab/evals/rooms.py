@@ -1,4 +1,7 @@
-"""`langflash lab eval rooms`, `ablations`, `calibrate`, `level` and `moved`: what rendered rooms tell."""
+"""`langflash lab eval rooms`, `ablations`, `calibrate`, `level` and `moved`: what rendered rooms tell.
+
+All raise `LangFlashError` where what is judged, the checkpoint or the output cannot be used.
+"""
 
 from argparse import Namespace
 from pathlib import Path
@@ -33,11 +36,7 @@ def _check_cache(args: Namespace) -> None:
 
 
 def rooms(args: Namespace, out: TextIO) -> None:
-    """Judge a checkpoint on held-out rooms.
-
-    Raises:
-        LangFlashError: cache, checkpoint or output cannot be used.
-    """
+    """Judge a checkpoint on held-out rooms."""
     _check_cache(args)
     check_files(args)
     result = run_eval(args.cache, args.weights, preset=args.preset, limit=args.limit)
@@ -45,11 +44,7 @@ def rooms(args: Namespace, out: TextIO) -> None:
 
 
 def ablations(args: Namespace, out: TextIO) -> None:
-    """Judge every rival on the same rooms.
-
-    Raises:
-        LangFlashError: cache, checkpoint or output cannot be used.
-    """
+    """Judge every rival on the same rooms."""
     _check_cache(args)
     check_files(args)
     if args.work is not None:
@@ -82,11 +77,7 @@ def ablations(args: Namespace, out: TextIO) -> None:
 
 
 def calibrate(args: Namespace, out: TextIO) -> None:
-    """Find the threshold from which a phrase counts as present.
-
-    Raises:
-        LangFlashError: cache, folder, checkpoint or output cannot be used.
-    """
+    """Find the threshold from which a phrase counts as present."""
     _check_cache(args)
     if args.plot is not None:
         check_output_file(args.plot, (".png",), option="--plot")
@@ -118,22 +109,14 @@ def _plot(path: Path, sets: dict, threshold: float) -> None:
 
 
 def _held_out(args: Namespace, count: int) -> tuple[Pack, range]:
-    """The pack and the rooms' seeds, `count` unless --limit says how many; output and folder can be written.
-
-    Raises:
-        LangFlashError: the pack, the folder or the output cannot be used.
-    """
+    """The pack, and the rooms' seeds: `count` unless --limit says how many."""
     check_files(args)
     pack = load_pack(readable_file(args.pack, "furniture pack", InputError))
     return pack, range(HELD_OUT_SEED, HELD_OUT_SEED + (args.limit or count))
 
 
 def level(args: Namespace, out: TextIO) -> None:
-    """Judge how held-out rooms stand, how large they are, what inventory and plan get right.
-
-    Raises:
-        LangFlashError: the pack, the folder or the output cannot be used.
-    """
+    """Judge how held-out rooms stand, how large they are, what inventory and plan get right."""
     pack, seeds = _held_out(args, 100)
     from langflash_core.lab.evaluation.level import run_level, tables
 
@@ -145,11 +128,7 @@ def level(args: Namespace, out: TextIO) -> None:
 
 
 def moved(args: Namespace, out: TextIO) -> None:
-    """Judge what is found of things that were moved between two scenes of a room.
-
-    Raises:
-        LangFlashError: the pack, the folder or the output cannot be used.
-    """
+    """Judge what is found of things that were moved between two scenes of a room."""
     pack, seeds = _held_out(args, 10)
     from langflash_core.lab.evaluation.moved import run_moved, tables
 

@@ -1,5 +1,8 @@
 """`langflash lab eval walk`, `sides`, `sharp`, `posed`, `real`, `photos-labelled` and `grouping`: what scenes
-are like beside what is known of their photos; and `beside`, two versions on the same ones."""
+are like beside what is known of their photos; and `beside`, two versions on the same ones.
+
+All raise `LangFlashError` where what is judged, the checkpoint or the output cannot be used.
+"""
 
 import io
 import json
@@ -129,11 +132,7 @@ def _check_source(args: Namespace) -> None:
 
 
 def sides(args: Namespace, out: TextIO) -> None:
-    """Judge a checkpoint, and the code that runs it, by views from aside.
-
-    Raises:
-        LangFlashError: pack, folder, checkpoint or output cannot be used.
-    """
+    """Judge a checkpoint, and the code that runs it, by views from aside."""
     _check_source(args)
     if args.pack is not None and args.size is not None:
         raise InputError("rooms are drawn at the network's own size; leave --size out, or judge --posed")
@@ -162,11 +161,7 @@ def _side_cases(args: Namespace) -> Iterator[tuple[Iterator, int]]:
 
 
 def sharp(args: Namespace, out: TextIO) -> None:
-    """Judge the code that makes scenes by their pictures at the photos' size.
-
-    Raises:
-        LangFlashError: photos, pack, folder, checkpoint or output cannot be used.
-    """
+    """Judge the code that makes scenes by their pictures at the photos' size."""
     if sum((bool(args.photos), args.folder is not None, args.pack is not None)) > 1:
         raise InputError("give photos, a folder with --posed, or furniture with --pack; not two of them")
     check_files(args)
@@ -204,11 +199,7 @@ def _subjects(args: Namespace) -> Iterator[tuple[Any, int]]:
 
 
 def posed(args: Namespace, out: TextIO) -> None:
-    """Judge a checkpoint on pairs of real photos of known poses.
-
-    Raises:
-        LangFlashError: folder, checkpoint or output cannot be used.
-    """
+    """Judge a checkpoint on pairs of real photos of known poses."""
     check_files(args)
     folder = _posed_folder(args, "single photos with photos-labelled")
     from langflash_core.lab.evaluation.posed import PAIRS, run_posed, tables
@@ -220,11 +211,7 @@ def posed(args: Namespace, out: TextIO) -> None:
 
 
 def photos_labelled(args: Namespace, out: TextIO) -> None:
-    """Judge a checkpoint on single real photos that somebody labelled.
-
-    Raises:
-        LangFlashError: folder, checkpoint or output cannot be used.
-    """
+    """Judge a checkpoint on single real photos that somebody labelled."""
     check_files(args)
     folder = opened_folder(args)
     if not folder.labelled:
@@ -240,11 +227,7 @@ def photos_labelled(args: Namespace, out: TextIO) -> None:
 
 
 def grouping(args: Namespace, out: TextIO) -> None:
-    """Judge groups and parts of single real photos against what was named or outlined in them.
-
-    Raises:
-        LangFlashError: folder, checkpoint or output cannot be used.
-    """
+    """Judge groups and parts of single real photos against what was named or outlined in them."""
     check_files(args)
     folder = opened_folder(args)
     ids = chosen(args, folder)
@@ -259,11 +242,7 @@ def grouping(args: Namespace, out: TextIO) -> None:
 
 
 def walk(args: Namespace, out: TextIO) -> None:
-    """Judge the code that makes scenes of many photos.
-
-    Raises:
-        LangFlashError: pack, folder, checkpoint or output cannot be used.
-    """
+    """Judge the code that makes scenes of many photos."""
     _check_walk(args)
     from langflash_core.lab.evaluation.walk import run_walks, tables
     from langflash_core.lab.evaluation.walk_scenes import Bench
@@ -333,11 +312,7 @@ def _walks(args: Namespace, plan: "Plan") -> "Iterator[tuple[Iterator[Walk], int
 
 
 def real(args: Namespace, out: TextIO) -> None:
-    """Judge the code that makes scenes by real frames.
-
-    Raises:
-        LangFlashError: frames, checkpoint or output cannot be used.
-    """
+    """Judge the code that makes scenes by real frames."""
     check_files(args)
     from langflash_core.lab.evaluation.real import Bench, judge, real_markdown, summary
 
