@@ -8,7 +8,7 @@ import io
 import json
 from argparse import Namespace
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from contextlib import contextmanager
+from contextlib import AbstractContextManager, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TextIO, TypeVar
@@ -54,16 +54,21 @@ OPTIONS = (
 """By which numbers of a walk change."""
 
 
-@contextmanager
 def opened(
     args: Namespace, kind: type[AnyBench], *, words: bool = False, **options: Any
-) -> Iterator[tuple[AnyBench, ProgressBar]]:
-    """What the options say scenes are made and judged with. words: weight maps are drawn, too."""
+) -> AbstractContextManager[tuple[AnyBench, ProgressBar]]:
+    """What the options say scenes are made and judged with; LPIPS is read at once. words: weight maps are
+    drawn, too."""
     lpips = opened_lpips(getattr(args, "lpips", None))
-    size = getattr(args, "size", None)
-    with open_renderer(args.backend) as renderer, ProgressBar() as progress:
-        render = renderer if words else colour_only(renderer)
-        yield kind(render, args.weights, args.preset, size, lpips, **options), progress
+
+    @contextmanager
+    def judging() -> Iterator[tuple[AnyBench, ProgressBar]]:
+        with open_renderer(args.backend) as renderer, ProgressBar() as progress:
+            render = renderer if words else colour_only(renderer)
+            size = getattr(args, "size", None)
+            yield kind(render, args.weights, args.preset, size, lpips, **options), progress
+
+    return judging()
 
 
 def check_files(args: Namespace) -> None:
@@ -139,7 +144,8 @@ def sides(args: Namespace, out: TextIO) -> None:
     check_files(args)
     from langflash_core.lab.evaluation.sides import run_sides, tables
 
-    with _side_cases(args) as (cases, count), opened(args, Bench) as (bench, progress):
+    judging = opened(args, Bench)
+    with _side_cases(args) as (cases, count), judging as (bench, progress):
         result = run_sides(cases, count, bench, progress)
     write_results(args.results, "sides", result)
     write_tables(args, result, markdown(tables(result)), out)
@@ -171,7 +177,8 @@ def sharp(args: Namespace, out: TextIO) -> None:
 
     ways = WAYS if args.detail is None else (PLAIN, *dict.fromkeys(args.detail))
     options = {"ways": ways, "beside": args.beside, "keep": args.keep}
-    with _subjects(args) as (subjects, count), opened(args, Bench, **options) as (bench, progress):
+    judging = opened(args, Bench, **options)
+    with _subjects(args) as (subjects, count), judging as (bench, progress):
         result = run_sharp(subjects, count, bench, progress=progress)
     write_results(args.results, "sharp", result)
     write_tables(args, result, markdown(tables(result)), out)
@@ -254,7 +261,8 @@ def walk(args: Namespace, out: TextIO) -> None:
     options = {"alone": not args.no_own} | {
         name: getattr(args, name) for name in ("align", "assume_lens", "memory", "colmap")
     }
-    with _walks(args, plan) as (walks, count), opened(args, Bench, **options) as (bench, progress):
+    judging = opened(args, Bench, **options)
+    with _walks(args, plan) as (walks, count), judging as (bench, progress):
         kept = {} if args.results is None else {
             "shelf": _shelf(args, plan, bench), "shown": keeper(args.results / PICTURES)
         }  # fmt: skip
