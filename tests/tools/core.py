@@ -4,15 +4,13 @@
 
 Read as text: nothing of a checkout is imported. The lab is left out. What is counted:
 
-- numbers: names of a module that hold one, outside records; and those in bodies, but 0, 1, 2
+- numbers: names of a module that hold one, outside records
 - reprojections: functions that say themselves where points lie in a photo
 - neighbour rules: functions that choose photos for a photo, or pairs of photos
-- bare participles: functions whose name is one (`told`, `blended`)
 - rooms, returns: folders that `pipeline.reconstruct` gets into by calls, in the order of the source, each
   function once; and how often it gets into one that it had left. Aside stand those that hold arithmetic and
   data alone, and the corridor that calls one after the other. A method that one class alone has is that
   one's where the module that calls imports its module, itself or through others
-- modules, their returns: the same of single modules, none aside
 """
 
 import argparse
@@ -28,11 +26,6 @@ START = f"{CORE}.pipeline.reconstruct"
 PRIMITIVES = (f"{CORE}.geometry.cameras", f"{CORE}.geometry.pinhole", f"{CORE}.rig")
 ASIDE = ("base", "errors", "geometry", "pipeline", "reconstruction", "rig", "types")
 FUNCTIONS = (ast.FunctionDef, ast.AsyncFunctionDef)
-IRREGULAR = re.compile(
-    "begun|bent|bound|brought|built|caught|chosen|cut|done|drawn|felt|found|given|gone|grown|held|kept|known|"
-    "laid|led|left|lit|lost|made|meant|met|put|read|said|seen|sent|set|shown|sought|spent|split|spoken|spread|"
-    "stood|swept|taken|taught|thought|told|torn|understood|woven|written"
-)
 PROJECTING = tuple(f"{CORE}.geometry.{name}" for name in ("cameras.project", "pinhole.to_pixels"))
 CHOOSING = re.compile(
     r"list\[(int|list\[int\]|tuple\[int, int\])\]|tuple\[tuple\[int, \.\.\.\], \.\.\.\]|"
@@ -91,12 +84,6 @@ def constants(tree: ast.Module) -> list[str]:
     return names
 
 
-def numbers_in_bodies(tree: ast.Module) -> int:
-    every = (node for _, function in functions(tree) for part in function.body for node in ast.walk(part))
-    held = [node.value for node in every if isinstance(node, ast.Constant)]
-    return sum(type(value) in (int, float) and value not in (0, 1, 2) for value in held)
-
-
 def imported(tree: ast.Module) -> dict[str, str]:
     """Dotted names of what a module imports, by the names that it has there."""
     every = (node for node in ast.walk(tree) if isinstance(node, ast.ImportFrom) and node.module)
@@ -130,13 +117,6 @@ def is_neighbour_rule(function: ast.FunctionDef | ast.AsyncFunctionDef) -> bool:
     given = {one.arg for one in (*function.args.args, *function.args.kwonlyargs)}
     asked = OF_A_PHOTO if returns == "list[int]" else OF_PHOTOS
     return bool(CHOOSING.fullmatch(returns)) and bool(given & asked)
-
-
-def is_bare_participle(name: str) -> bool:
-    word = name.rsplit(".", 1)[-1].strip("_")
-    return "_" not in word and (
-        bool(IRREGULAR.fullmatch(word)) or (word.endswith("ed") and word not in ("seed", "need"))
-    )
 
 
 class Walk:
@@ -200,32 +180,21 @@ class Walk:
         return [name for name, _ in groupby(name for name in folders if name not in ASIDE)]
 
 
-def _returns(entered: list[str]) -> int:
-    return len(entered) - len(set(entered))
-
-
 def counts(checkout: Path) -> dict[str, list[str] | int]:
     """What is counted of a checkout, as names where it has some."""
     trees = modules(checkout)
     every = [(m, name, node) for m, tree in trees.items() for name, node in functions(tree)]
-    outside = [of for of in every if not of[0].startswith(PRIMITIVES)]
+    outside = [each for each in every if not each[0].startswith(PRIMITIVES)]
     known = {m: imported(tree) for m, tree in trees.items()}
-    root = [path.stem for path in sorted((checkout / CORE).glob("*.py")) if not path.stem.startswith("_")]
     walk = Walk(trees)
     sys.setrecursionlimit(10_000)
     walk.follow(START)
     return {
         "numbers named in modules": [f"{m}.{name}" for m, tree in trees.items() for name in constants(tree)],
-        "numbers in bodies, but 0, 1, 2": sum(map(numbers_in_bodies, trees.values())),
-        "modules at the root": root,
         "reprojections": [f"{m}.{name}" for m, name, node in outside if is_reprojection(node, known[m])],
         "neighbour rules": [f"{m}.{name}" for m, name, node in outside if is_neighbour_rule(node)],
-        "bare participles": [f"{m}.{name}" for m, name, _ in every if is_bare_participle(name)],
-        "functions": len(every),
         "rooms": sorted(set(walk.rooms)),
-        "returns": _returns(walk.rooms),
-        "modules": sorted(set(walk.entered)),
-        "their returns": _returns(walk.entered),
+        "returns": len(walk.rooms) - len(set(walk.rooms)),
     }
 
 

@@ -194,19 +194,8 @@ def walk(someone: Person) -> Iterator[Shot]:
     someone.do("mousemove", str(someone.size[0] - 40), str(TOP + 40))
     yield Shot("The answer: where the plant is", someone.rest())
     middle = (str((LEFT + someone.size[0]) // 2), str(someone.size[1] // 2))
-    someone.do(
-        "mousemove",
-        *middle,
-        "mousedown",
-        "1",
-        "mousemove_relative",
-        "60",
-        "-25",
-        "sleep",
-        "0.3",
-        "mouseup",
-        "1",
-    )
+    dragged = "mousedown 1 mousemove_relative 60 -25 sleep 0.3 mouseup 1"
+    someone.do("mousemove", *middle, *dragged.split())
     yield Shot("The same from another place", someone.rest())
 
 

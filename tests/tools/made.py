@@ -138,7 +138,7 @@ def by_window() -> None:
             camera = importlib.import_module("app.window.scene.camera")
             show = importlib.import_module("app.window.scene.commands")
             guide.tell(show.OpenPaths(tuple(map(str, photos_of(name)))))
-            guide.until(lambda: _scene_is_there(guide), "the scene")
+            guide.until(lambda guide=guide: _shown(guide.session.state.scene), "the scene")
             guide.ask(*PHRASES)
             for mode, _ in tour.MODES:
                 guide.tell(camera.SetMode(mode))
@@ -152,38 +152,32 @@ def by_window() -> None:
             _exported(guide)
 
 
+def _shown(scene) -> bool:
+    return scene.info is not None and scene.job is None
+
+
 def _exported(guide) -> None:
-    """What the window's dialog writes, of versions whose dialog knows the table of files."""
-    with contextlib.suppress(ImportError):
-        outputs = importlib.import_module("langflash_core.base.outputs")
-        export = importlib.import_module("app.window.exporting.commands")
-        for what, path in (
-            (outputs.RGB, "rgb.png"), (outputs.CUTOUT, "cutout.png"), (outputs.PLY, "a.ply"),
-            (outputs.PAGE, "page.html"), (outputs.COCO, "coco.json"),
-        ):  # fmt: skip
-            Path("exported").mkdir(exist_ok=True)
-            target = Path("exported", path).resolve()
-            guide.tell(export.ShowExport())
-            form = replace(guide.session.state.exporting.form, what=what, path=str(target))
-            guide.tell(export.EditForm(form))
-            guide.steps(0.5)
-            guide.tell(export.Export(sure=True))
-            guide.until(target.exists, path)
-            guide.until(lambda: guide.session.state.exporting.running is None, "the end of the export")
-
-
-def _scene_is_there(guide) -> bool:
-    """The state's fields moved into halves."""
-    state = getattr(guide.session.state, "scene", guide.session.state)
-    return state.info is not None and state.job is None
+    """What the window's dialog writes."""
+    outputs = importlib.import_module("langflash_core.base.outputs")
+    export = importlib.import_module("app.window.exporting.commands")
+    Path("exported").mkdir()
+    for what, path in (
+        (outputs.RGB, "rgb.png"), (outputs.CUTOUT, "cutout.png"), (outputs.PLY, "a.ply"),
+        (outputs.PAGE, "page.html"), (outputs.COCO, "coco.json"),
+    ):  # fmt: skip
+        target = Path("exported", path).resolve()
+        guide.tell(export.ShowExport())
+        form = replace(guide.session.state.exporting.form, what=what, path=str(target))
+        guide.tell(export.EditForm(form))
+        guide.steps(0.5)
+        guide.tell(export.Export(sure=True))
+        guide.until(target.exists, path)
+        guide.until(lambda: guide.session.state.exporting.running is None, "the end of the export")
 
 
 @contextlib.contextmanager
 def _window() -> Iterator[tuple]:
-    try:
-        tour = importlib.import_module("tests.tools.tour")
-    except ImportError:
-        tour = importlib.import_module("tests.app.window.tour")
+    tour = importlib.import_module("tests.tools.tour")
     with tempfile.TemporaryDirectory() as place, tour.x_server(*tour.SIZE) as display:
         os.environ.update(DISPLAY=display, LANGFLASH_CONFIG=place, LANGFLASH_STATE=place, HOME=place)
         guide = tour.Guide(display)

@@ -70,17 +70,7 @@ _NAMES = {
     "page_up": "Prior", "page_down": "Next", "home": "Home", "delete": "Delete", "backspace": "BackSpace",
 }  # fmt: skip
 _OTHERS = (
-    "Escape",
-    "Return",
-    "Tab",
-    "shift+Tab",
-    "End",
-    "space",
-    "minus",
-    "plus",
-    "F6",
-    "F11",
-    "ctrl+c",
+    *["Escape", "Return", "Tab", "shift+Tab", "End", "space", "minus", "plus", "F6", "F11", "ctrl+c"],
     *"wasdqet0",
 )
 
@@ -99,18 +89,8 @@ KEYS = (*(chord(keys) for entry in ENTRIES for keys in entry.keys), *_OTHERS)
 COMMANDS = tuple(entry.name for entry in ENTRIES)
 PALETTE = chord(named("All commands").keys[0])
 SURE = ("Discard", "Open it")  # buttons of the questions before a scene that is opened
-WORDS = (
-    "armchair",
-    "wall - floor",
-    "sofa + cushion",
-    "plant",
-    "+",
-    "élan 椅子",
-    "a " * 200,
-    "0.5",
-    "-3",
-    "room",
-)
+WORDS = ("armchair", "wall - floor", "sofa + cushion", "plant", "+", "élan 椅子", "a " * 200, "0.5", "-3")
+WORDS = (*WORDS, "room")
 PAIR = ("living_room_left.png", "living_room_right.png")
 PHOTOS = (*PAIR, "books_left.jpg")
 
@@ -374,15 +354,8 @@ class Watched:
         own = {**environment(folder, ROOT), "DISPLAY": display}
         own.pop("WAYLAND_DISPLAY", None)
         self._errors = (folder / "stderr.txt").open("w+")
-        self.process = subprocess.Popen(
-            program,
-            env=own,
-            cwd=folder,
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            stderr=self._errors,
-            text=True,
-        )
+        pipes = {"stdin": subprocess.PIPE, "stdout": subprocess.PIPE, "stderr": self._errors}
+        self.process = subprocess.Popen(program, env=own, cwd=folder, text=True, **pipes)
         self.last: dict = {}
         self.heard = time.monotonic()
         self._reader = threading.Thread(target=self._read, daemon=True)
@@ -411,10 +384,7 @@ class Watched:
         """Wait until the window has taken the input that waits: a frame takes one letter of a command, so
         what a slow one was sent would answer the questions of what comes now."""
         start = time.monotonic()
-        while time.monotonic() < start + PATIENCE and self.process.poll() is None:
-            if self.heard > start + 1.0 and not self.last.get("queued"):
-                return
-            time.sleep(0.2)
+        self._waits(lambda: self.heard > start + 1.0 and not self.last.get("queued"), PATIENCE)
 
     def until_scene(self, before: int | None, count: int, click: Callable[[list[int]], None]) -> bool:
         """Wait for another scene than number `before`, of `count` Gaussians, at rest; edits that would be
@@ -442,18 +412,18 @@ class Watched:
     def _is_answered(self, box: list[int], end: float) -> None:
         """Wait until a click on a question has come through what was typed before, of which a frame takes one
         letter. A second click would meet the next question's button."""
-        end = min(end, time.monotonic() + LONGEST_QUEUE)
-        while self.last.get("discard") == box and time.monotonic() < end and self.process.poll() is None:
-            time.sleep(0.1)
+        self._waits(lambda: self.last.get("discard") != box, min(end - time.monotonic(), LONGEST_QUEUE))
 
     def reconstructs(self) -> bool:
         """Wait for the scene of the photos that the window was launched with."""
-        end = time.monotonic() + PATIENCE
-        while time.monotonic() < end and self.process.poll() is None:
-            if self.last.get("scene") is not None:
-                return True
-            time.sleep(0.2)
-        return False
+        self._waits(lambda: self.last.get("scene") is not None, PATIENCE)
+        return self.last.get("scene") is not None
+
+    def _waits(self, holds: Callable[[], bool], patience: float) -> None:
+        """Until something holds, the time is over, or the window has ended."""
+        end = time.monotonic() + patience
+        while not holds() and time.monotonic() < end and self.process.poll() is None:
+            time.sleep(0.1)
 
     def ask(self) -> None:
         """Ask for the checkpoints' size and picture."""

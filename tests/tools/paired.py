@@ -72,43 +72,35 @@ def asking(scene: Path) -> float:
     return timed(lambda: lf.query(loaded, PHRASES), 3)
 
 
-def _drawing(scene: Path, act: Callable) -> float:
-    lf = importlib.import_module("langflash_core")
+@contextmanager
+def _renderer():
+    """The package and OpenGL."""
     renderers = importlib.import_module("app.cli.renderers")
-    loaded = lf.load(scene)
-    camera = importlib.import_module("langflash_core.types").Camera
-    shot = camera(loaded.viewmats[0], loaded.Ks[0], *loaded.view_size)
     with renderers.open_renderer("gl") as renderer:
-        return act(loaded, shot, renderer, lf)
+        yield importlib.import_module("langflash_core"), renderer
 
 
 def drawing(scene: Path) -> float:
     """Colours, depth and weight maps of one view, by OpenGL."""
-
-    def act(loaded, shot, renderer, lf) -> float:
+    with _renderer() as (lf, renderer):
+        loaded = lf.load(scene)
+        camera = importlib.import_module("langflash_core.types").Camera
+        shot = camera(loaded.viewmats[0], loaded.Ks[0], *loaded.view_size)
         renderer(loaded, shot)
         return timed(lambda: renderer(loaded, shot), 10)
-
-    return _drawing(scene, act)
 
 
 def answering(scene: Path) -> float:
     """Four phrases of a view that OpenGL draws."""
-
-    def act(loaded, shot, renderer, lf) -> float:
-        def ask() -> None:
-            lf.query(loaded, PHRASES, render=renderer)
-
-        ask()
-        return timed(ask, 5)
-
-    return _drawing(scene, act)
+    with _renderer() as (lf, renderer):
+        loaded = lf.load(scene)
+        lf.query(loaded, PHRASES, render=renderer)
+        return timed(lambda: lf.query(loaded, PHRASES, render=renderer), 5)
 
 
 @contextmanager
 def _window():
-    moved = Path("tests/tools").is_dir()  # in versions since
-    tour = importlib.import_module("tests.tools.tour" if moved else "tests.app.window.tour")
+    tour = importlib.import_module("tests.tools.tour")
     with tempfile.TemporaryDirectory() as place, tour.x_server(*tour.SIZE) as display:
         os.environ.update(DISPLAY=display, LANGFLASH_CONFIG=place, LANGFLASH_STATE=place, HOME=place)
         guide = tour.Guide(display)
@@ -118,19 +110,20 @@ def _window():
             guide.close()
 
 
-def _shown(guide) -> bool:
-    """The state's fields moved into halves."""
-    state = getattr(guide.session.state, "scene", guide.session.state)
-    return state.info is not None and state.job is None
+def _open(guide, scene: Path) -> None:
+    show = importlib.import_module("app.window.scene.commands")
+    guide.tell(show.OpenPaths((str(scene),)))
+    guide.until(lambda: _shown(guide.session.state.scene), "the scene")
+
+
+def _shown(scene) -> bool:
+    return scene.info is not None and scene.job is None
 
 
 def _until_shown(scene: Path, then: Callable[..., object] = lambda guide: None) -> float:
-    show = importlib.import_module("app.window.scene.commands")
-
     def act() -> None:
         with _window() as guide:
-            guide.tell(show.OpenPaths((str(scene),)))
-            guide.until(lambda: _shown(guide), "the scene")
+            _open(guide, scene)
             then(guide)
 
     return timed(act)
@@ -154,11 +147,9 @@ def opening(scene: Path) -> float:
 def turning(scene: Path) -> float:
     """A step of the window's loop while a scene with a heat-map is turned; pictures are as fine as the window
     makes them then."""
-    show = importlib.import_module("app.window.scene.commands")
     camera = importlib.import_module("app.window.scene.camera")
     with _window() as guide:
-        guide.tell(show.OpenPaths((str(scene),)))
-        guide.until(lambda: _shown(guide), "the scene")
+        _open(guide, scene)
         guide.ask(*PHRASES[:1])
         guide.rest()
 

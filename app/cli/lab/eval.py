@@ -1,37 +1,20 @@
 """`langflash lab eval`: how good a checkpoint is on rooms and photos it has never seen, and how it looks."""
 
-import io
 import logging
 import sys
 from argparse import Namespace
-from pathlib import Path
 from typing import TextIO
 
-from langflash_core.base.files import check_output_file, make_folder, readable_file, write_atomically
+from langflash_core.base.files import check_output_file, readable_file
 from langflash_core.base.request import trim_phrases
 from langflash_core.errors import ImageError, InputError, WeightsError
-from langflash_core.lab.evaluation.rooms.run import run_eval
-from langflash_core.lab.evaluation.tables import markdown
-from langflash_core.lab.photos import chosen_ids
-from langflash_core.lab.training.stages.stage import guided
-from langflash_core.network import load_network
 
 from ..renderers import open_renderer
-from ..report import ProgressBar, say_warnings, write_json, write_tables
-from .evals.ablations import ablations
-from .evals.beside import beside
+from .evals import rooms, scenes
 from .evals.labels import labels
-from .evals.level import level
-from .evals.moved import moved
 from .evals.phrases import phrases
 from .evals.protocol import protocol
-from .evals.real import real
 from .evals.report import report
-from .evals.sharp import sharp
-from .evals.sides import sides
-from .evals.walk import walk
-from .photos import chosen, opened_folder
-from .shared import opened_lpips
 
 
 def run(args: Namespace, out: TextIO) -> None:
@@ -44,131 +27,25 @@ def run(args: Namespace, out: TextIO) -> None:
     if getattr(args, "weights", None) is not None and args.action != "labels":
         readable_file(args.weights, "checkpoint", WeightsError)
     {
-        "ablations": ablations,
-        "beside": beside,
-        "rooms": _rooms,
-        "calibrate": _calibrate,
-        "grouping": _grouping,
+        "ablations": rooms.ablations,
+        "beside": scenes.beside,
+        "rooms": rooms.rooms,
+        "calibrate": rooms.calibrate,
+        "grouping": scenes.grouping,
         "photos": _photos,
-        "photos-labelled": _photos_labelled,
-        "posed": _posed,
+        "photos-labelled": scenes.photos_labelled,
+        "posed": scenes.posed,
         "labels": labels,
-        "level": level,
-        "moved": moved,
+        "level": rooms.level,
+        "moved": rooms.moved,
         "phrases": phrases,
         "protocol": protocol,
-        "real": real,
+        "real": scenes.real,
         "report": report,
-        "sharp": sharp,
-        "sides": sides,
-        "walk": walk,
+        "sharp": scenes.sharp,
+        "sides": scenes.sides,
+        "walk": scenes.walk,
     }[args.action](args, out)
-
-
-def _check_cache(args: Namespace) -> None:
-    if not args.cache.is_dir():
-        raise InputError(f"there is no folder {args.cache}; make it with langflash lab train cache")
-
-
-def _rooms(args: Namespace, out: TextIO) -> None:
-    _check_cache(args)
-    if args.output is not None:
-        check_output_file(args.output, (".md",))
-    result = run_eval(args.cache, args.weights, preset=args.preset, limit=args.limit)
-    write_tables(args, result, markdown(result), out)
-
-
-def _photos_labelled(args: Namespace, out: TextIO) -> None:
-    if args.output is not None:
-        check_output_file(args.output, (".md",))
-    folder = opened_folder(args)
-    if not folder.labelled:
-        raise InputError(
-            f"{args.folder} has no names.csv, so nothing in it is labelled; add one, and labels/"
-        )
-    ids = chosen(args, folder)
-    from langflash_core.lab.evaluation.labelled import run_photos
-    from langflash_core.lab.evaluation.photo_tables import photos_markdown
-
-    with ProgressBar() as progress, open_renderer(args.backend) as renderer:
-        result, _ = run_photos(
-            folder, ids, renderer, args.weights, preset=args.preset, size=args.size, progress=progress
-        )
-    write_tables(args, result, photos_markdown(result), out)
-
-
-def _grouping(args: Namespace, out: TextIO) -> None:
-    if args.output is not None:
-        check_output_file(args.output, (".md",))
-    folder = opened_folder(args)
-    ids = chosen(args, folder)
-    from langflash_core.lab.evaluation.grouped import grouping_markdown, run_grouping
-
-    network = guided(load_network(args.preset, args.weights))
-    with ProgressBar() as progress:
-        result = run_grouping(network, folder, ids, progress)
-    write_tables(args, result, grouping_markdown(result), out)
-
-
-def _posed(args: Namespace, out: TextIO) -> None:
-    if args.output is not None:
-        check_output_file(args.output, (".md",))
-    folder = opened_folder(args)
-    if folder.poses is None:
-        raise InputError(
-            f"{args.folder} has no poses.txt; add it, or judge single photos with photos-labelled"
-        )
-    from langflash_core.lab.evaluation.photo_tables import posed_markdown
-    from langflash_core.lab.evaluation.posed import APART, PAIRS, chosen_triples, run_posed
-
-    triples = chosen_triples(folder.ids, args.limit or PAIRS, args.apart or APART)
-    lpips = opened_lpips(args.lpips)
-    with ProgressBar() as progress, open_renderer(args.backend) as renderer:
-        result = run_posed(
-            folder,
-            triples,
-            renderer,
-            args.weights,
-            preset=args.preset,
-            size=args.size,
-            lpips=lpips,
-            align=args.align,
-            progress=progress,
-        )
-    write_tables(args, result, posed_markdown(result), out)
-
-
-def _calibrate(args: Namespace, out: TextIO) -> None:
-    _check_cache(args)
-    if args.plot is not None:
-        check_output_file(args.plot, (".png",), option="--plot")
-    from langflash_core.lab.evaluation.calibration import calibration, photos_asked, rooms_asked
-
-    network = load_network(args.preset, args.weights)
-    sets = {"rooms": rooms_asked(network, args.cache, limit=args.limit)}
-    if args.folder is not None:
-        folder = opened_folder(args)
-        ids = chosen_ids(folder.ids, "validation", args.only)
-        with ProgressBar() as progress, open_renderer(args.backend) as renderer:
-            sets["photos"] = photos_asked(
-                folder, ids, renderer, args.weights, preset=args.preset, progress=progress
-            )
-    found = calibration(network, sets)
-    if args.plot is not None:
-        _plot(args.plot, sets, found["threshold"])
-    write_json({"calibration": found}, out)
-
-
-def _plot(path: Path, sets: dict, threshold: float) -> None:
-    try:
-        from langflash_core.lab.evaluation.calibration_plot import calibration_png
-    except ImportError:
-        say_warnings(
-            ["the plot is left out, because matplotlib is missing; pip install matplotlib brings it"]
-        )
-        return
-    make_folder(path.parent)
-    write_atomically(path, calibration_png(sets, threshold))
 
 
 def _photos(args: Namespace, out: TextIO) -> None:
@@ -184,8 +61,5 @@ def _photos(args: Namespace, out: TextIO) -> None:
     prompts = PROMPTS if args.prompt is None else trim_phrases(args.prompt)
     with open_renderer(None) as renderer:
         sheet = pair_sheet(pairs, renderer, weights=args.weights, prompts=prompts)
-    stream = io.BytesIO()
-    sheet.save(stream, "PNG", optimize=True)
-    make_folder(args.output.parent)
-    write_atomically(args.output, stream.getvalue())
+    scenes.write_sheet(args.output, sheet)
     print(f"{args.output}: {len(pairs)} pair{'s' * (len(pairs) > 1)}", file=out)

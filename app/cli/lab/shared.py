@@ -5,7 +5,7 @@ from typing import TYPE_CHECKING
 
 from langflash_core.base.files import readable_file
 from langflash_core.errors import WeightsError
-from langflash_core.lab.evaluation.labelled import Render
+from langflash_core.lab.evaluation.bench import Render
 from langflash_core.scene.exposure import lit_camera
 from langflash_core.types import Camera, Frame, Scene
 from langflash_core.writing.renderers import Renderer

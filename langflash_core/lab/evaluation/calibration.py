@@ -17,7 +17,8 @@ from torch import Tensor
 
 from langflash_core.base.running import Progress
 from langflash_core.errors import InputError
-from langflash_core.lab.evaluation.labelled import Render, ask_photo, draw_photo, judged_by
+from langflash_core.lab.evaluation.bench import Bench
+from langflash_core.lab.evaluation.labelled import Judged, ask_photo, draw_photo
 from langflash_core.lab.evaluation.labelled import Tally as PhotoTally
 from langflash_core.lab.evaluation.metrics import Presence, presence
 from langflash_core.lab.evaluation.rooms.phrases import MASK_THRESHOLDS
@@ -83,10 +84,7 @@ def rooms_asked(network: LangFlashNet, data: Path, *, limit: int | None = None) 
 def photos_asked(
     folder: PhotoFolder,
     ids: Sequence[str],
-    render: Render,
-    weights: Path | None = None,
-    *,
-    preset: str = "mini",
+    bench: Bench,
     progress: Progress = lambda stage, fraction: None,
 ) -> Asked:
     """Phrases in labelled photos, as `run_photos` asks them.
@@ -94,8 +92,7 @@ def photos_asked(
     Raises:
         InputError: the folder has no labels, or a map cannot be used.
     """
-    judged = judged_by(folder, render, weights, preset=preset, progress=progress)
-    tally = PhotoTally()
+    judged, tally = Judged.of(folder, bench), PhotoTally()
     for done, id in enumerate(ids):
         progress(f"photo {id}, {done + 1} of {len(ids)}", done / len(ids))
         drawn, _ = draw_photo(judged, folder.photo(id))

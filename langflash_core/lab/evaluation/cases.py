@@ -9,95 +9,96 @@ Sizes: H W pixels as the network saw the photos, L labels.
 import math
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 
 import numpy as np
 import torch
 from torch import Tensor
 from torch.nn import functional as F
 
-from langflash_core.errors import InputError
+from langflash_core.base.running import Progress
 from langflash_core.lab.evaluation import posed
+from langflash_core.lab.evaluation.bench import Bench, as_seen, relative
 from langflash_core.lab.evaluation.consistency import label_consistency
-from langflash_core.lab.evaluation.labelled import METHODS, Render, rounded
-from langflash_core.lab.evaluation.lpips import Lpips
 from langflash_core.lab.evaluation.metrics import (
-    POSE_LIMITS,
     PoseError,
     Presence,
-    calibration_error,
-    pose_auc,
     pose_error,
+    pose_measures,
+    presence_measures,
 )
-from langflash_core.lab.evaluation.posed import (
-    LEFT_OUT,
-    as_seen,
-    judge_aligned,
-    judge_depth,
-    judge_picture,
-    moved_camera,
-    relative,
-    scene_of,
-)
-from langflash_core.lab.evaluation.protocols import Case
+from langflash_core.lab.evaluation.posed import LEFT_OUT, judge_depth, judge_view
+from langflash_core.lab.evaluation.protocols import PROTOCOLS, Case
 from langflash_core.lab.evaluation.rooms.tally import MIN_SHARE
 from langflash_core.lab.evaluation.rooms.target import language_maps
 from langflash_core.lab.evaluation.segments import label_border_f
-from langflash_core.lab.evaluation.sights import Look, Sight, error_picture, label_picture, photo_picture
-from langflash_core.lab.evaluation.tallies import Shelf, collected, intervals, merged
+from langflash_core.lab.evaluation.tables import labels_table, markdown, measures_table, rounded
+from langflash_core.lab.evaluation.tallies import Shelf, intervals, judged, merged
 from langflash_core.lab.photos import LabelledPhoto
 from langflash_core.lab.photos.fitting import FittedPhoto
-from langflash_core.lab.photos.folder import lenses_of
-from langflash_core.lab.training.measures import (
-    accuracy,
-    class_ious,
-    confusion,
-    nan_mean,
-    occurring_mean_iou,
-)
+from langflash_core.lab.training.measures import accuracy, class_ious, confusion, nan_mean, occurring_mean_iou
 from langflash_core.language.relevance import compile_query, relevance_maps
 from langflash_core.language.spaces import LanguageSpace, language_space
 from langflash_core.network import PRESETS, LangFlashNet, load_network
 from langflash_core.pipeline import query
-from langflash_core.reconstruction.networks import Networks
 from langflash_core.types import Frame, Scene, Views
+
+MEASURES = (
+    ("Rotation error, median (degrees)", "pose_rotation_median", "", ""),
+    ("Direction error, median (degrees)", "pose_direction_median", "", ""),
+    ("Pose AUC at 5 degrees", "pose_auc_5", "", ""),
+    ("Pose AUC at 10 degrees", "pose_auc_10", "", ""),
+    ("Pose AUC at 20 degrees", "pose_auc_20", "", ""),
+    ("Depth AbsRel, each photo's scale aligned", "depth_abs_rel", "", ""),
+    ("Depth AbsRel of one depth", "depth_abs_rel_flat", "", ""),
+    ("Depth delta < 1.25", "depth_delta1", "", ""),
+    ("PSNR of kept back views, whole picture (dB)", "psnr_whole_picture", "", ""),
+    ("PSNR of kept back views, pose fitted, whole picture (dB)", "psnr_whole_picture_aligned", "", ""),
+    ("PSNR of kept back views, covered pixels (dB)", "psnr", "", ""),
+    ("PSNR of the first photo instead, same pixels (dB)", "psnr_first_photo", "", ""),
+    ("SSIM of kept back views, whole picture", "ssim_whole_picture", "", ""),
+    ("LPIPS of kept back views, VGG, whole picture", "lpips_whole_picture", "", ""),
+    ("LPIPS of kept back views, VGG, pose fitted, whole picture", "lpips_whole_picture_aligned", "", ""),
+    ("Share of kept back views that is covered", "covered", "", ""),
+    ("Label consistency across views", "label_consistency", "", ""),
+    ("Presence precision", "presence_precision", "", ""),
+    ("Presence recall", "presence_recall", "", ""),
+    ("Presence F1", "presence_f1", "", ""),
+    ("Calibration error of scores (ECE)", "calibration_error", "", ""),
+    ("Second photo found its place", "placed", "", ""),
+    ("Reconstruction, seconds", "seconds", "", ""),
+)
+METHODS = {"atoms": "the program: atoms drawn", "features": "2D features of each view, no scene"}
+COLUMNS = {
+    f"{kind}_{what}": f"{kind} {text}"
+    for kind in ("source", "target")
+    for what, text in (("miou", "mIoU"), ("picture_miou", "picture mIoU"), ("accuracy", "accuracy"))
+}
+PUBLISHED: dict[str, Sequence[tuple[str, float, float]]] = {
+    "scannet": (
+        ("LangFlash as published (Liu et al. 2026), main table", 0.7416, 0.8718),
+        ("LangFlash as published, table of K, K = 128", 0.7144, 0.8547),
+    ),
+}
+"""Per protocol: title, mIoU, accuracy. Their weights cannot be had here; their view is as they chose it."""
 
 
 @dataclass(frozen=True)
 class Judge:
-    """What every case is judged with. network: a second copy, for features alone; None leaves them out.
-    align: targets also from poses fitted to them."""
+    """What every case is judged with. network: a second copy, for features alone; None leaves them out."""
 
-    render: Render
+    bench: Bench
     space: LanguageSpace
     network: LangFlashNet | None = None
-    lpips: Lpips | None = None
-    weights: Path | None = None
-    preset: str = "mini"
-    size: int | None = None
-    align: bool = False
-    networks: Networks = field(default_factory=Networks, repr=False, compare=False)
 
     @staticmethod
-    def of(
-        render: Render,
-        weights: Path | None = None,
-        *,
-        preset: str = "mini",
-        size: int | None = None,
-        lpips: Lpips | None = None,
-        features: bool = True,
-        align: bool = False,
-    ) -> "Judge":
+    def of(bench: Bench, *, features: bool = True) -> "Judge":
         """Ready to judge; `features`: also 2D features, for which the network is read a second time.
 
         Raises:
             WeightsError: the checkpoint does not fit.
         """
-        network = load_network(preset, weights) if features else None
-        return Judge(
-            render, language_space(PRESETS[preset].space), network, lpips, weights, preset, size, align
-        )
+        network = load_network(bench.preset, bench.weights) if features else None
+        return Judge(bench, language_space(PRESETS[bench.preset].space), network)
 
 
 @dataclass
@@ -125,9 +126,18 @@ class Seen:
 
 
 def case_tallies(
-    judge: Judge, cases: Iterable[Case], shelf: Shelf | None = None, look: Look | None = None
-) -> Iterator[tuple[str, Tally]]:
-    """Scene and tally of every case, in order; those on the shelf are not judged again."""
+    judge: Judge,
+    cases: Iterable[Case],
+    *,
+    count: int | None = None,
+    shelf: Shelf | None = None,
+    progress: Progress = lambda stage, fraction: None,
+) -> list[tuple[str, Tally]]:
+    """Scene and tally of every case, in order; those on the shelf are not judged again.
+
+    Raises:
+        InputError: there is no case.
+    """
     scenes: dict[str, str] = {}
 
     def named() -> Iterator[tuple[str, Case]]:
@@ -135,40 +145,38 @@ def case_tallies(
             scenes[case.name] = case.scene
             yield case.name, case
 
-    for name, tally in collected(named(), lambda case: judge_case(judge, case, look), shelf):
-        yield scenes[name], tally
+    found = judged(
+        named(), lambda case, _: judge_case(judge, case), count=count, shelf=shelf, progress=progress
+    )
+    return [(scenes[name], tally) for name, tally in found.items()]
 
 
 @torch.no_grad()
-def judge_case(judge: Judge, case: Case, look: Look | None = None) -> Tally:
+def judge_case(judge: Judge, case: Case) -> Tally:
     """Everything about one case."""
     tally = Tally()
     photos = [case.folder.photo(id) for id in case.photos]
-    scene, seconds = scene_of(
-        photos,
-        lenses_of(photos),
-        weights=judge.weights,
-        preset=judge.preset,
-        size=judge.size,
-        networks=judge.networks,
-    )
+    bench = judge.bench
+    scene, seconds = bench.scene_of(photos)
     tally.note(seconds=seconds, placed=float(scene.num_views == len(photos)))
     tally.note(**{f"stage_{name}_seconds": value for name, value in scene.record.cost.timings.items()})
     sources = [as_seen(photo, scene.view_size) for photo in photos[: scene.num_views]]
-    frames = [judge.render(scene, scene.camera(view)) for view in range(len(sources))]
+    frames = [bench.render(scene, scene.camera(view)) for view in range(len(sources))]
     scale = judge_depth(frames, sources, tally)
     poses = [_pose(photos[0], photo) for photo in photos]
     if len(photos) > 1:
         scale = _judge_pose(scene, poses, scale, tally)
     views = [Seen(s, f, p, "source") for s, f, p in zip(sources, frames, poses, strict=False)]
     if not math.isnan(scale):
-        views += [_target(judge, case, id, photos[0], scene, scale, tally, sources[0]) for id in case.targets]
+        for id in case.targets:
+            photo = case.folder.photo(id)
+            viewmat, target = relative(photos[0], photo), as_seen(photo, scene.view_size)
+            frame = judge_view(scene, viewmat, scale, target, sources[0], bench, tally)
+            views.append(Seen(target, frame, viewmat, "target"))
     answers = [_judge_labels(judge, case, scene, view, tally) for view in views] if case.labels else []
     if case.labels:
         _ask(judge, case, scene, views[0], tally)
         _judge_consistency(views, answers, tally)
-    if look is not None:
-        look(_sight(case, views, answers, tally))
     return tally
 
 
@@ -191,28 +199,6 @@ def _judge_pose(scene: Scene, poses: Sequence[Tensor | None], scale: float, tall
     if not math.isnan(scale):
         return scale
     return float(truth[:3, 3].norm() / predicted[:3, 3].norm().clamp_min(1e-9))
-
-
-def _target(
-    judge: Judge,
-    case: Case,
-    id: str,
-    first: LabelledPhoto,
-    scene: Scene,
-    scale: float,
-    tally: Tally,
-    start: FittedPhoto,
-) -> Seen:
-    """A view that was kept back, drawn from its true place; its picture is judged."""
-    photo = case.folder.photo(id)
-    viewmat = relative(first, photo)
-    fitted = as_seen(photo, scene.view_size)
-    camera = moved_camera(viewmat, scale, fitted, scene.view_size)
-    frame = judge.render(scene, camera)
-    judge_picture(frame, fitted, tally, start, judge.lpips)
-    if judge.align:
-        judge_aligned(scene, judge.render, camera, fitted, tally, judge.lpips)
-    return Seen(fitted, frame, viewmat, "target")
 
 
 def _rows(case: Case, photo: FittedPhoto) -> Tensor:
@@ -277,14 +263,9 @@ def _ask(judge: Judge, case: Case, scene: Scene, view: Seen, tally: Tally) -> No
     phrases = [case.labels[row] for row in asked]
     found = query(scene, phrases, size=(width, height), render=lambda scene, camera: view.frame)
     there = [float(shares[row]) > 0 for row in asked]
-    pairs = list(zip([answer.found for answer in found.answers], there, strict=True))
-    tally.presence += Presence(*(pairs.count((f, t)) for t, f in _CELLS))
+    tally.presence += Presence.of([answer.found for answer in found.answers], there)
     tally.scores.append(torch.tensor([answer.score for answer in found.answers]))
     tally.truths.append(torch.tensor(there))
-
-
-_CELLS = ((True, True), (False, True), (True, False), (False, False))
-"""(there, found) of hits, false alarms, misses and rejections."""
 
 
 def _judge_consistency(views: Sequence[Seen], answers: Sequence[np.ndarray], tally: Tally) -> None:
@@ -306,47 +287,14 @@ def _judge_consistency(views: Sequence[Seen], answers: Sequence[np.ndarray], tal
     )
 
 
-def _sight(case: Case, views: Sequence[Seen], answers: Sequence[np.ndarray], tally: Tally) -> Sight:
-    """The case for people; the last view is a target where there is one."""
-    first, last = views[0], views[-1]
-    start, photo = (v.photo.rgb.permute(1, 2, 0).float() / 255 for v in (first, last))
-    pictures = {
-        "first photo": photo_picture(start),
-        "another view": photo_picture(photo),
-        "drawn": photo_picture(last.frame.rgb),
-        "error": error_picture(last.frame.rgb, photo),
-    }
-    numbers = {name: tally.numbers[name][-1] for name in ("psnr", "depth_abs_rel") if name in tally.numbers}
-    if answers:
-        truth = _rows(case, last.photo).numpy()
-        pictures["labels"] = label_picture(np.where(truth >= 0, answers[-1], -1))
-        pictures["true labels"] = label_picture(truth)
-        if (truth >= 0).any():
-            numbers["labels right"] = float((answers[-1] == truth)[truth >= 0].mean())
-    worth = numbers.get("labels right", numbers.get("psnr", math.nan))
-    return Sight(case.name, case.name, pictures, numbers, worth)
-
-
 def summary(tally: Tally) -> dict:
     """Means and tables, rounded; plain JSON. Labels: over all pixels of cases with one list of labels, then
     the mean over lists; "picture_miou" is the mean over pictures."""
-    measures = {name: nan_mean(values) for name, values in tally.numbers.items()}
+    measures = tally.means()
     if tally.poses:
-        areas = pose_auc([error.worst for error in tally.poses])
-        measures |= {f"pose_auc_{limit:g}": area for limit, area in zip(POSE_LIMITS, areas, strict=True)}
-        rotations = torch.tensor([error.rotation for error in tally.poses])
-        directions = torch.tensor([error.direction for error in tally.poses])
-        measures |= {
-            "pose_rotation_median": float(rotations.nanmedian()),
-            "pose_direction_median": float(directions.nanmedian()),
-        }
+        measures |= pose_measures(tally.poses)
     if tally.scores:
-        measures |= {
-            "presence_precision": tally.presence.precision,
-            "presence_recall": tally.presence.recall,
-            "presence_f1": tally.presence.f1,
-            "calibration_error": calibration_error(torch.cat(tally.scores), torch.cat(tally.truths)),
-        }
+        measures |= presence_measures(tally.presence, torch.cat(tally.scores), torch.cat(tally.truths))
     return {"measures": rounded(dict(sorted(measures.items()))), "labels": _label_tables(tally)}
 
 
@@ -375,13 +323,7 @@ def _label_tables(tally: Tally) -> dict[str, dict[str, float | None]]:
 
 
 def result_of(tallies: Sequence[tuple[str, Tally]], *, draws: int = 300) -> dict:
-    """Summary of cases, with 95 % intervals that draw scenes, and each scene by itself; plain JSON.
-
-    Raises:
-        InputError: there is no case.
-    """
-    if not tallies:
-        raise InputError("no case was judged; give a folder that holds scenes, and a limit above 0")
+    """Summary of cases, with 95 % intervals that draw scenes, and each scene by itself; plain JSON."""
     by_scene: dict[str, list[Tally]] = {}
     for scene, tally in tallies:
         by_scene.setdefault(scene, []).append(tally)
@@ -394,3 +336,18 @@ def result_of(tallies: Sequence[tuple[str, Tally]], *, draws: int = 300) -> dict
         "intervals": intervals(list(scenes.values()), summary, draws=draws),
         "by_scene": {scene: summary(tally) for scene, tally in scenes.items()},
     }
+
+
+def cases_markdown(protocol: str, result: dict) -> str:
+    """Measures and labels, beside what papers say of themselves."""
+    chosen, known = PROTOCOLS[protocol], result["intervals"]
+    about = f"{result['cases']} cases of {result['scenes']} scenes; in brackets 95 % of draws of scenes."
+    measured = {key: value for key, value in result["measures"].items() if value is not None}
+    tables = [
+        measures_table("", MEASURES, measured, known),
+        labels_table("", METHODS, COLUMNS, result["labels"], known),
+    ]
+    text = markdown(tables, f"## {chosen.title}", chosen.about, about)
+    for title, miou, accurate in PUBLISHED.get(protocol, ()) if result["labels"] else ():
+        text += f"\n{title}: mIoU {miou:.4f}, accuracy {accurate:.4f}.\n"
+    return text

@@ -16,8 +16,7 @@ from jaxtyping import Float64, Integer
 
 from langflash_core.base.running import Progress
 from langflash_core.lab.evaluation.borders import UNKNOWN, border_f1
-from langflash_core.lab.evaluation.numbers import rounded
-from langflash_core.lab.evaluation.tables import cell
+from langflash_core.lab.evaluation.tables import Measure, by_measure, markdown, rounded
 from langflash_core.lab.photos import PhotoFolder
 from langflash_core.lab.photos.fitting import fitted, network_size
 from langflash_core.lab.training.measures import nan_mean
@@ -30,13 +29,13 @@ SMALLEST = 0.0008
 """Share of the photo below which a region is not judged."""
 
 
-TITLES = {
-    "best_iou": "IoU of the best one, mean over true regions",
-    "recall": "true regions whose best one has an IoU over .5",
-    "achievable": "pixels right if each were named by most of what lies in it",
-    "border_f1": "F1 of borders, 4 pixels",
-    "count": "how many",
-}
+MEASURES = (
+    Measure("IoU of the best one, mean over true regions", "best_iou"),
+    Measure("true regions whose best one has an IoU over .5", "recall"),
+    Measure("pixels right if each were named by most of what lies in it", "achievable"),
+    Measure("F1 of borders, 4 pixels", "border_f1"),
+    Measure("how many", "count"),
+)
 
 
 @dataclass(frozen=True)
@@ -146,7 +145,7 @@ def run_grouping(
 
 def grouping_markdown(result: dict) -> str:
     """The means as a table."""
-    lines = [f"{result['photos']} photos of {result['folder']}", "", "| | groups | parts |", "|---|---|---|"]
-    for name, title in TITLES.items():
-        lines.append(f"| {title} | {cell(result['groups'][name])} | {cell(result['parts'][name])} |")
-    return "\n".join(lines) + "\n"
+    columns = {kind: result[kind] for kind in ("groups", "parts")}
+    return markdown(
+        [by_measure("", "", columns, MEASURES)], f"{result['photos']} photos of {result['folder']}"
+    )

@@ -8,28 +8,21 @@ Sizes: H W drawn pixels, K atoms, C channels, P phrases, L fine names.
 """
 
 import math
-import tempfile
 import time
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
 
 import torch
-from PIL import Image
 from torch import Tensor
 from torch.nn import functional as F
 
+from langflash_core.base.running import Progress
 from langflash_core.images.pictures import centre_box
 from langflash_core.images.views import load_views, source_pictures
+from langflash_core.lab.evaluation.bench import Bench, files_of
 from langflash_core.lab.evaluation.borders import OTHER, UNKNOWN, border_f1, right_near_borders
-from langflash_core.lab.evaluation.metrics import Presence, calibration_error
-from langflash_core.lab.evaluation.numbers import mask_iou, rounded
-from langflash_core.lab.evaluation.photo_words import (
-    PhotoWords,
-    absent_rows,
-    paper_row,
-    photos_of_names,
-)
+from langflash_core.lab.evaluation.metrics import Presence, mask_iou, presence_measures
+from langflash_core.lab.evaluation.photo_words import PhotoWords, absent_rows, paper_row, photos_of_names
 from langflash_core.lab.evaluation.rooms.phrases import MASK_THRESHOLDS, PHRASES
 from langflash_core.lab.evaluation.rooms.tally import MIN_SHARE
 from langflash_core.lab.evaluation.rooms.target import language_maps
@@ -42,7 +35,8 @@ from langflash_core.lab.evaluation.sights import (
     legend_of,
     photo_picture,
 )
-from langflash_core.lab.evaluation.tallies import Shelf, collected, merged
+from langflash_core.lab.evaluation.tables import Table, cell, labels_table, measures_table, rounded
+from langflash_core.lab.evaluation.tallies import Noted, Shelf, judged, merged
 from langflash_core.lab.evaluation.words import PAPER_LABELS
 from langflash_core.lab.photos import LabelledPhoto, Name, PhotoFolder
 from langflash_core.lab.photos.fitting import seen_through
@@ -52,7 +46,7 @@ from langflash_core.lab.training.measures import (
     align_scale,
     class_ious,
     confusion,
-    delta1,
+    depth_measures,
     mean_iou,
     nan_mean,
 )
@@ -60,18 +54,50 @@ from langflash_core.language.relevance import compile_query, relevance_maps
 from langflash_core.language.settings import ANSWERING
 from langflash_core.language.spaces import LanguageSpace, language_space
 from langflash_core.network import PRESETS, LangFlashNet, load_network
-from langflash_core.pipeline import query, reconstruct
-from langflash_core.reconstruction.networks import Networks
-from langflash_core.types import Camera, Frame, Scene, Views
+from langflash_core.pipeline import query
+from langflash_core.types import Frame, Scene, Views
 
 DRAWN = 1
 """Scenes are drawn at so many times the size of the network's photo."""
-METHODS = ("atoms", "features")
+METHODS = {"atoms": "the program: atoms drawn", "features": "2D features of the photo, no scene"}
 """Where names are read from: the drawn atoms, the features of the photo before there is a scene."""
+MEASURES = (
+    ("Depth AbsRel, scale aligned", "depth_abs_rel", "one depth", "depth_abs_rel_flat"),
+    ("Depth AbsRel, median photo", "depth_abs_rel_median", "", ""),
+    ("Depth delta < 1.25, scale aligned", "depth_delta1", "", ""),
+    ("Depth AbsRel in metres, no alignment", "depth_abs_rel_metric", "", ""),
+    ("True metres per guessed metre, median photo", "depth_scale", "", ""),
+    ("Presence precision", "presence_precision", "", ""),
+    ("Presence recall", "presence_recall", "", ""),
+    ("Presence F1", "presence_f1", "", ""),
+    ("Phrases asked, half of them absent", "presence_phrases", "", ""),
+    ("Calibration error of scores (ECE)", "calibration_error", "", ""),
+    ("Border F of 37 classes", "border_f_atoms", "2D features", "border_f_features"),
+    ("At the photo's size: F1 of borders, 4 pixels", "border_f1", "", ""),
+    ("At the photo's size: named right within 8 pixels of a border", "right_near_borders", "", ""),
+    ("At the photo's size: named right elsewhere", "right_elsewhere", "", ""),
+    ("At the photo's size: mIoU of 37 classes", "large_classes_miou", "", ""),
+    ("True masks called by their name, of all names of the folder", "masks_right_atoms",
+     "2D features", "masks_right_features"),
+    ("... mean over names", "mask_names_right_atoms", "2D features", "mask_names_right_features"),
+    ("... masks judged", "masks", "", ""),
+    ("Share of the picture that the scene covers", "covered", "", ""),
+    ("Reconstruction, seconds a photo", "seconds", "", ""),
+)  # fmt: skip
+COLUMNS = {
+    f"{kind}_{what}": f"{text}: {name}"
+    for kind, text in {
+        "classes": "37 classes",
+        "paper": "8 labels",
+        "published": "8 labels, desks are other",
+        "fine": "fine names",
+    }.items()
+    for what, name in (("miou", "mIoU"), ("accuracy", "accuracy"))
+}
+BEST = 10
+"""So many fine names are listed from either end."""
 LARGE = "atoms, large"
 """The drawn atoms at the photo's size: of these the classes are counted, for one measure."""
-Render = Callable[[Scene, Camera], Frame]
-Progress = Callable[[str, float], None]
 
 
 @dataclass(frozen=True)
@@ -79,27 +105,29 @@ class Judged:
     """What every photo is judged with. network: a second copy, for the features alone; vectors: of
     `words.phrases`, unit rows (P, C)."""
 
+    bench: Bench
     network: LangFlashNet
     space: LanguageSpace
     names: dict[int, Name]
     words: PhotoWords
     vectors: Tensor
-    weights: Path | None
-    preset: str
-    size: int | None
-    render: Render
-    networks: Networks = field(default_factory=Networks, repr=False, compare=False)
+
+    @staticmethod
+    def of(folder: PhotoFolder, bench: Bench) -> "Judged":
+        """The words of a folder and a checkpoint, ready to judge photos."""
+        words = PhotoWords.of(folder.names, photos_of_names(folder, folder.ids))
+        space = language_space(PRESETS[bench.preset].space)
+        network = load_network(bench.preset, bench.weights)
+        return Judged(bench, network, space, folder.names, words, space.encode(words.phrases))
 
 
 @dataclass
-class Tally:
-    """What a run collects. numbers: per photo, by name; counts: confusion by (method, label set), the
-    last column for pixels without an answer; presence: found against truth; scores, truths: of every
-    phrase asked; ious: of the masks of present phrases at each of `MASK_THRESHOLDS`, one row each;
-    overlaps: per fine name the pixels of mask and truth together, of either, and photos; masks: by (method,
-    name) true masks, and how many of them are called so."""
+class Tally(Noted):
+    """What a run collects. counts: confusion by (method, label set), the last column for pixels without an
+    answer; presence: found against truth; scores, truths: of every phrase asked; ious: of the masks of
+    present phrases at each of `MASK_THRESHOLDS`, one row each; overlaps: per fine name the pixels of mask and
+    truth together, of either, and photos; masks: by (method, name) true masks, and how many are called so."""
 
-    numbers: dict[str, list[float]] = field(default_factory=dict)
     counts: dict[tuple[str, str], Tensor] = field(default_factory=dict)
     presence: Presence = field(default_factory=Presence)
     scores: list[Tensor] = field(default_factory=list)
@@ -107,10 +135,6 @@ class Tally:
     ious: list[Tensor] = field(default_factory=list)
     overlaps: dict[str, tuple[int, int, int]] = field(default_factory=dict)
     masks: dict[tuple[str, str], tuple[int, int]] = field(default_factory=dict)
-
-    def note(self, **values: float) -> None:
-        for name, value in values.items():
-            self.numbers.setdefault(name, []).append(float(value))
 
     def count(self, method: str, labels: str, found: Tensor, truth: Tensor, classes: int) -> None:
         """Add pixels: rows `found` (-1: no answer) against `truth` (-1: not judged), both flat."""
@@ -137,11 +161,8 @@ class Drawn:
 def run_photos(
     folder: PhotoFolder,
     ids: Sequence[str],
-    render: Render,
-    weights: Path | None = None,
+    bench: Bench,
     *,
-    preset: str = "mini",
-    size: int | None = None,
     shelf: Shelf | None = None,
     progress: Progress = lambda stage, fraction: None,
 ) -> tuple[dict, Tally]:
@@ -149,7 +170,7 @@ def run_photos(
 
     Args:
         ids: of the photos judged; how often a name occurs is counted in the whole folder.
-        render: draws a scene with weight maps. size: as `reconstruct` has it.
+        bench: whose renderer draws weight maps.
 
     Returns:
         Plain JSON ("measures", "labels", "class_ious", "paper_ious", "names", "masks") and what it was
@@ -158,80 +179,40 @@ def run_photos(
     Raises:
         InputError: the folder has no labels, or a map cannot be used. WeightsError: of the checkpoint.
     """
-    judged = judged_by(folder, render, weights, preset=preset, size=size, progress=progress)
-    tallies = []
-    for id, tally in photo_tallies(judged, folder, ids, shelf):
-        tallies.append(tally)
-        progress(f"photo {id}, {len(tallies)} of {len(ids)}", 0.1 + 0.9 * len(tallies) / len(ids))
-    tally = merged(tallies)
+    progress("names of the folder", 0.0)
+    setting = Judged.of(folder, bench)
+    photos = ((id, folder.photo(id)) for id in ids)
+    kept = judged(
+        photos,
+        lambda photo, _: judge(setting, photo),
+        count=len(ids),
+        shelf=shelf,
+        progress=lambda stage, fraction: progress(f"photo {stage}", 0.1 + 0.9 * fraction),
+    )
+    tally = merged(list(kept.values()))
     result = {
-        "weights": str(weights) if weights else preset,
+        "weights": bench.made_with,
         "folder": folder.root.name,
         "photos": len(ids),
         "numbers": [ids[0], ids[-1]],
-        **summary(tally, judged.words),
+        **summary(tally, setting.words),
     }
     return result, tally
 
 
-def photo_tallies(
-    judged: Judged,
-    folder: PhotoFolder,
-    ids: Sequence[str],
-    shelf: Shelf | None = None,
-    look: Look | None = None,
-) -> Iterator[tuple[str, Tally]]:
-    """Id and tally of every photo, in order; those on the shelf are not judged again."""
-
-    def judge(id: str) -> Tally:
-        tally = Tally()
-        judge_photo(judged, folder.photo(id), tally, look)
-        return tally
-
-    return collected(((id, id) for id in ids), judge, shelf)
-
-
-def judged_by(
-    folder: PhotoFolder,
-    render: Render,
-    weights: Path | None = None,
-    *,
-    preset: str = "mini",
-    size: int | None = None,
-    progress: Progress = lambda stage, fraction: None,
-) -> Judged:
-    """The words of a folder and a checkpoint, ready to judge photos."""
-    progress("names of the folder", 0.0)
-    words = PhotoWords.of(folder.names, photos_of_names(folder, folder.ids))
-    space = language_space(PRESETS[preset].space)
-    network = load_network(preset, weights)
-    return Judged(
-        network, space, folder.names, words, space.encode(words.phrases), weights, preset, size, render
-    )
-
-
 def draw_photo(judged: Judged, photo: LabelledPhoto) -> tuple[Drawn, float]:
     """A photo through the whole program, and the seconds that the reconstruction took."""
-    preset = PRESETS[judged.preset]
-    with tempfile.TemporaryDirectory() as folder:
-        path = Path(folder) / f"{photo.id}.png"
-        Image.fromarray(photo.image).save(path, "PNG", compress_level=1)
+    bench, preset = judged.bench, PRESETS[judged.bench.preset]
+    with files_of([photo]) as paths:
         start = time.perf_counter()
-        scene = reconstruct(
-            [path],
-            preset=judged.preset,
-            weights=judged.weights,
-            intrinsics=photo.intrinsics,
-            size=judged.size,
-            networks=judged.networks,
-        )
+        scene = bench.scene(paths, intrinsics=photo.intrinsics)
         seconds = time.perf_counter() - start
-        area = preset.native_area if judged.size is None else judged.size**2
+        area = preset.native_area if bench.size is None else bench.size**2
         views = load_views(
-            [path], intrinsics=photo.intrinsics, area=area, multiple=preset.patch, square=preset.square
+            paths, intrinsics=photo.intrinsics, area=area, multiple=preset.patch, square=preset.square
         )
     width, height = scene.view_size[0] * DRAWN, scene.view_size[1] * DRAWN
-    frame = judged.render(scene, scene.camera(0, width, height))
+    frame = judged.bench.render(scene, scene.camera(0, width, height))
     assert frame.weight_maps is not None
     compiled = compile_query(scene, judged.space, judged.words.judged)
     maps = relevance_maps(frame.weight_maps, compiled)
@@ -246,8 +227,9 @@ def draw_photo(judged: Judged, photo: LabelledPhoto) -> tuple[Drawn, float]:
 
 
 @torch.no_grad()
-def judge_photo(judged: Judged, photo: LabelledPhoto, tally: Tally, look: Look | None = None) -> None:
-    """Everything about one photo; adds to `tally`."""
+def judge(judged: Judged, photo: LabelledPhoto, look: Look | None = None) -> Tally:
+    """Everything about one photo."""
+    tally = Tally()
     drawn, seconds = draw_photo(judged, photo)
     tally.note(seconds=seconds, covered=float((drawn.frame.alphas >= ANSWERING.covered_alpha).float().mean()))
     if photo.depths is not None:
@@ -259,6 +241,7 @@ def judge_photo(judged: Judged, photo: LabelledPhoto, tally: Tally, look: Look |
         ask_photo(judged, drawn, int(photo.id) if photo.id.isdigit() else 0, tally)
     if look is not None:
         look(_sight(judged, photo, drawn))
+    return tally
 
 
 def _sight(judged: Judged, photo: LabelledPhoto, drawn: Drawn) -> Sight:
@@ -291,12 +274,7 @@ def _sight(judged: Judged, photo: LabelledPhoto, drawn: Drawn) -> Sight:
 def judge_depth(drawn: Drawn, metric: bool, tally: Tally) -> None:
     """The drawn depth with its scale aligned, a wall instead of it, and lengths as they were guessed."""
     truth = torch.where(drawn.frame.alphas >= ANSWERING.covered_alpha, drawn.depths, 0.0)
-    aligned = align_scale(drawn.frame.depths, truth)
-    tally.note(
-        depth_abs_rel=abs_rel(aligned, truth),
-        depth_delta1=delta1(aligned, truth),
-        depth_abs_rel_flat=abs_rel(align_scale(torch.ones_like(truth), truth), truth),
-    )
+    tally.note(**depth_measures(drawn.frame.depths, truth))
     if metric:
         metres = drawn.frame.depths * (drawn.scene.record.network_unit or math.nan)
         valid = (truth > 0) & (metres > 0)
@@ -358,7 +336,7 @@ def judge_borders(judged: Judged, photo: LabelledPhoto, drawn: Drawn, tally: Tal
     """The 37 classes and their borders, drawn again at the size of the photo (768 pixels long at most)."""
     assert photo.labels is not None
     height, width = source_pictures(drawn.views)[0].shape[1:]
-    frame = judged.render(drawn.scene, drawn.scene.camera(0, width, height))
+    frame = judged.bench.render(drawn.scene, drawn.scene.camera(0, width, height))
     assert frame.weight_maps is not None
     words = judged.words
     maps = relevance_maps(frame.weight_maps, compile_query(drawn.scene, judged.space, words.classes))
@@ -393,7 +371,7 @@ def ask_photo(judged: Judged, drawn: Drawn, seed: int, tally: Tally) -> None:
     height, width = rows.shape
     found = query(drawn.scene, phrases, size=(width, height), render=lambda scene, camera: drawn.frame)
     truths = torch.arange(len(phrases)) < len(present)
-    tally.presence += _counts([answer.found for answer in found.answers], truths.tolist())
+    tally.presence += Presence.of([answer.found for answer in found.answers], truths.tolist())
     tally.scores.append(torch.tensor([answer.score for answer in found.answers]))
     tally.truths.append(truths)
     for place, row in enumerate(present):
@@ -418,31 +396,16 @@ def overlap_fine(judged: Judged, drawn: Drawn, tally: Tally) -> None:
         )
 
 
-def _counts(found: Sequence[bool], there: Sequence[bool]) -> Presence:
-    pairs = list(zip(found, there, strict=True))
-    return Presence(
-        hits=pairs.count((True, True)),
-        false_alarms=pairs.count((True, False)),
-        misses=pairs.count((False, True)),
-        rejections=pairs.count((False, False)),
-    )
-
-
 def summary(tally: Tally, words: PhotoWords) -> dict:
     """Means, medians and tables of a run, rounded; plain JSON."""
-    measures = {name: nan_mean(values) for name, values in tally.numbers.items()}
+    measures = tally.means()
     if "depth_abs_rel" in tally.numbers:
-        measures["depth_abs_rel_median"] = float(torch.tensor(tally.numbers["depth_abs_rel"]).nanmedian())
+        measures["depth_abs_rel_median"] = tally.median("depth_abs_rel")
     if "depth_scale" in tally.numbers:
-        measures["depth_scale"] = float(torch.tensor(tally.numbers["depth_scale"]).nanmedian())
+        measures["depth_scale"] = tally.median("depth_scale")
     if tally.scores:
-        measures |= {
-            "presence_precision": tally.presence.precision,
-            "presence_recall": tally.presence.recall,
-            "presence_f1": tally.presence.f1,
-            "presence_phrases": float(sum(len(s) for s in tally.scores)),
-            "calibration_error": calibration_error(torch.cat(tally.scores), torch.cat(tally.truths)),
-        }
+        measures |= presence_measures(tally.presence, torch.cat(tally.scores), torch.cat(tally.truths))
+        measures["presence_phrases"] = float(sum(len(s) for s in tally.scores))
     if (LARGE, "classes") in tally.counts:
         counts = tally.counts[LARGE, "classes"]
         measures["large_classes_miou"] = mean_iou(counts, range(len(words.classes)))
@@ -472,14 +435,15 @@ def summary(tally: Tally, words: PhotoWords) -> dict:
 
 def _mask_report(tally: Tally, words: PhotoWords) -> list[dict]:
     """Names in sight with their true masks, and how many of these each method calls so."""
-    rows = []
-    for name in words.every:
-        masks, _ = tally.masks.get((METHODS[0], name), (0, 0))
-        if masks:
-            rows.append(
-                {"name": name, "masks": masks, **{method: tally.masks[method, name][1] for method in METHODS}}
-            )
-    return rows
+    return [
+        {
+            "name": name,
+            "masks": tally.masks["atoms", name][0],
+            **{method: tally.masks[method, name][1] for method in METHODS},
+        }
+        for name in words.every
+        if ("atoms", name) in tally.masks
+    ]
 
 
 def _ious(tally: Tally, kind: str, names: Sequence[str]) -> dict[str, dict[str, float | None]]:
@@ -504,3 +468,33 @@ def _fine_report(tally: Tally, words: PhotoWords) -> list[dict]:
             asked = both / either if either else math.nan
             rows.append({"name": name, "photos": photos, **rounded({"iou": iou, "asked_iou": asked})})
     return sorted(rows, key=lambda row: -(row["iou"] or 0))
+
+
+def tables(result: dict) -> list[Table]:
+    """Measures, labels, IoU of every label that occurs, and fine names."""
+    own = [measures_table("", MEASURES, result["measures"])]
+    if not result["labels"]:
+        return own
+    return [
+        *own,
+        labels_table("", METHODS, COLUMNS, result["labels"]),
+        *(_ious_table(result[ious]) for ious in ("paper_ious", "class_ious")),
+        _fine_table(result["names"]),
+    ]
+
+
+def _ious_table(ious: dict[str, dict[str, float | None]]) -> Table:
+    kept = [name for name, value in ious["atoms"].items() if value is not None]
+    rows = [(title, *(cell(ious[method][name]) for name in kept)) for method, title in METHODS.items()]
+    return Table("", ("IoU", *kept), rows)
+
+
+def _fine_table(names: Sequence[dict]) -> Table:
+    """The best and the worst fine names, with the means over all of them."""
+    header = ("fine name", "photos", "IoU among fine names", "IoU of the mask when asked")
+    if not names:
+        return Table("", header, [])
+    means = [sum(row[key] or 0 for row in names) / len(names) for key in ("iou", "asked_iou")]
+    listed = names if len(names) <= 2 * BEST else [*names[:BEST], *names[-BEST:]]
+    rows = [(r["name"], str(r["photos"]), cell(r["iou"]), cell(r["asked_iou"])) for r in listed]
+    return Table("", header, [(f"mean of {len(names)}", "", *map(cell, means)), *rows])

@@ -14,11 +14,9 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 import numpy as np
 import torch
-from PIL import Image
 from scipy.ndimage import distance_transform_edt
 
 from langflash_core.base.files import make_folder
@@ -28,8 +26,10 @@ from langflash_core.geometry.rotations import turn_of
 from langflash_core.inventory import Inventory, Thing, inventory
 from langflash_core.inventory.plan import Plan, floor_plan
 from langflash_core.inventory.things import OPENINGS, STRUCTURE
+from langflash_core.lab.evaluation.bench import files_of
 from langflash_core.lab.evaluation.clicks import judge_clicks
-from langflash_core.lab.evaluation.numbers import rounded
+from langflash_core.lab.evaluation.tables import Measure, Table, by_measure, rounded
+from langflash_core.lab.photos import LabelledPhoto
 from langflash_core.lab.rooms import (
     HELD_OUT_LIBRARIES,
     Pack,
@@ -120,10 +120,8 @@ def kept_scene(staged: StagedRoom, seed: int, keep: Path | None, networks: Netwo
     path = None if keep is None else keep / f"{seed}.langflash"
     if path is not None and path.is_file():
         return load(path)
-    with TemporaryDirectory() as folder:
-        files = [Path(folder) / f"{seed}_{view}.png" for view in range(len(staged.views.images))]
-        for file, image in zip(files, staged.views.images, strict=True):
-            Image.fromarray(image).save(file, "PNG", compress_level=1)
+    photos = [LabelledPhoto(f"{seed}_{view}", image) for view, image in enumerate(staged.views.images)]
+    with files_of(photos) as files:
         K = staged.views.Ks[0]
         lens = (float(K[0, 0]), float(K[1, 1]), float(K[0, 2]), float(K[1, 2]))
         scene = reconstruct(files, intrinsics=lens, networks=networks)
@@ -429,11 +427,7 @@ MEASURES = (
 )  # fmt: skip
 
 
-def level_markdown(result: dict) -> str:
-    """The summary as a table."""
-    lines = ["| measure | value |", "|---|---|"]
-    known = result["summary"]
-    for title, key in MEASURES:
-        if known.get(key) is not None:
-            lines.append(f"| {title} | {known[key]:g} |")
-    return "\n".join(lines) + "\n"
+def tables(result: dict) -> list[Table]:
+    """The summary."""
+    measures = [Measure(title, key, "g") for title, key in MEASURES]
+    return [by_measure("", "measure", {"value": result["summary"]}, measures)]

@@ -1,10 +1,10 @@
 """Measures of poses, points and presence; those of depth and classes are in
-`training.measures`, of segments in `segments`, of pictures in `pictures`. Every measure is NaN where
+`training.measures`, of segments in `segments`, of pictures in `sharp_measures`. Every measure is NaN where
 nothing can be measured."""
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import astuple, dataclass
 
 import torch
 from torch import Tensor
@@ -69,6 +69,17 @@ def pose_auc(errors: Sequence[float], limits: Sequence[float] = POSE_LIMITS) -> 
     return areas
 
 
+def pose_measures(errors: Sequence[PoseError]) -> dict[str, float]:
+    """Medians and areas under the curve of a run."""
+    rotations, directions = torch.tensor([(e.rotation, e.direction) for e in errors]).reshape(-1, 2).T
+    areas = zip(POSE_LIMITS, pose_auc([error.worst for error in errors]), strict=True)
+    return {
+        "pose_rotation_median": float(rotations.nanmedian()),
+        "pose_direction_median": float(directions.nanmedian()),
+        **{f"pose_auc_{limit:g}": area for limit, area in areas},
+    }
+
+
 def point_error(points: Tensor, depths: Tensor, K: Tensor, viewmat: Tensor, scale: float) -> float:
     """Mean |X - X*| / |X*| of one view's points in the first camera's frame.
 
@@ -93,13 +104,14 @@ class Presence:
     misses: int = 0
     rejections: int = 0
 
+    @staticmethod
+    def of(found: Sequence[bool], there: Sequence[bool]) -> "Presence":
+        """Of phrases, in order."""
+        pairs = list(zip(found, there, strict=True))
+        return Presence(*map(pairs.count, ((True, True), (True, False), (False, True), (False, False))))
+
     def __add__(self, other: "Presence") -> "Presence":
-        return Presence(
-            self.hits + other.hits,
-            self.false_alarms + other.false_alarms,
-            self.misses + other.misses,
-            self.rejections + other.rejections,
-        )
+        return Presence(*(own + more for own, more in zip(astuple(self), astuple(other), strict=True)))
 
     @property
     def precision(self) -> float:
@@ -119,13 +131,23 @@ class Presence:
 
 def presence(scores: Tensor, present: Tensor, threshold: float) -> Presence:
     """Phrases with score >= threshold count as found; scores (P,), present (P,) bool."""
-    found = scores >= threshold
-    return Presence(
-        int((found & present).sum()),
-        int((found & ~present).sum()),
-        int((~found & present).sum()),
-        int((~found & ~present).sum()),
-    )
+    return Presence.of((scores >= threshold).tolist(), present.tolist())
+
+
+def presence_measures(counts: Presence, scores: Tensor, truths: Tensor) -> dict[str, float]:
+    """What a run says of phrases that it asked: found or not, and what scores are worth, (P,) each."""
+    return {
+        "presence_precision": counts.precision,
+        "presence_recall": counts.recall,
+        "presence_f1": counts.f1,
+        "calibration_error": calibration_error(scores, truths),
+    }
+
+
+def mask_iou(found: Tensor, truth: Tensor) -> float:
+    """Intersection over union of two bool masks of one shape; 0 where both are empty."""
+    union = float((found | truth).sum())
+    return float((found & truth).sum()) / union if union else 0.0
 
 
 def calibration_error(scores: Tensor, truths: Tensor, bins: int = 20) -> float:

@@ -29,7 +29,7 @@ from langflash_core.lab.evaluation.level import (
     true_instances,
     true_unit,
 )
-from langflash_core.lab.evaluation.numbers import rounded
+from langflash_core.lab.evaluation.tables import Measure, Table, by_measure, rounded
 from langflash_core.lab.rooms import Pack, RoomRenderer, RoomViews, StagedRoom
 from langflash_core.lab.rooms.layout import SLACK, Instance, Room
 from langflash_core.lab.rooms.sensor import expose
@@ -293,8 +293,7 @@ MEASURES = (
 )
 
 
-def moved_markdown(result: dict) -> str:
-    """The summary as a table."""
-    known = result["summary"]
-    rows = [f"| {title} | {known[key]:g} |" for title, key in MEASURES if known.get(key) is not None]
-    return "\n".join(["| measure | value |", "|---|---|", *rows]) + "\n"
+def tables(result: dict) -> list[Table]:
+    """The summary."""
+    measures = [Measure(title, key, "g") for title, key in MEASURES]
+    return [by_measure("", "measure", {"value": result["summary"]}, measures)]

@@ -25,7 +25,7 @@ from torch import Tensor
 from langflash_core.base.running import Progress
 from langflash_core.errors import InputError
 from langflash_core.images.pictures import centre_box
-from langflash_core.lab.evaluation.labelled import Render
+from langflash_core.lab.evaluation.bench import Render
 from langflash_core.pipeline import query
 from langflash_core.types import QueryResult, Scene
 

@@ -8,37 +8,26 @@ Sizes: H W pixels as the network saw the photos.
 """
 
 import math
-import time
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Sequence
 from dataclasses import dataclass, field
-from pathlib import Path
-from tempfile import TemporaryDirectory
 
 import torch
-from PIL import Image
 from torch import Tensor
 
 from langflash_core.base.running import Progress
 from langflash_core.errors import InputError
-from langflash_core.images.lens import Intrinsics
-from langflash_core.images.pictures import centre_box
 from langflash_core.lab.evaluation.alignment import aligned_camera
-from langflash_core.lab.evaluation.labelled import Render
-from langflash_core.lab.evaluation.lpips import Lpips
-from langflash_core.lab.evaluation.metrics import POSE_LIMITS, PoseError, pose_auc, pose_error
-from langflash_core.lab.evaluation.numbers import rounded
-from langflash_core.lab.evaluation.pictures import ssim
+from langflash_core.lab.evaluation.bench import Bench, as_seen, picture_of, relative
+from langflash_core.lab.evaluation.metrics import PoseError, pose_error, pose_measures
+from langflash_core.lab.evaluation.sharp_measures import ssim
 from langflash_core.lab.evaluation.sights import Look, Sight, error_picture, photo_picture
-from langflash_core.lab.evaluation.tallies import Shelf, collected, merged
-from langflash_core.lab.photos import LabelledPhoto, PhotoFolder
-from langflash_core.lab.photos.fitting import FittedPhoto, fitted
-from langflash_core.lab.photos.folder import lenses_of
+from langflash_core.lab.evaluation.tables import Measure, Table, by_row, measures_table, rounded
+from langflash_core.lab.evaluation.tallies import Noted, judged, merged
+from langflash_core.lab.photos import PhotoFolder
+from langflash_core.lab.photos.fitting import FittedPhoto
 from langflash_core.lab.training.losses import ssim_map
-from langflash_core.lab.training.measures import abs_rel, align_scale, delta1, nan_mean, psnr
+from langflash_core.lab.training.measures import depth_measures, nan_mean, psnr
 from langflash_core.language.settings import ANSWERING
-from langflash_core.pipeline import reconstruct
-from langflash_core.reconstruction.networks import Networks
 from langflash_core.scene.bare import bare_scene
 from langflash_core.types import Camera, Frame, Scene
 
@@ -47,6 +36,33 @@ APART = (6, 12, 18, 24)
 PAIRS = 40
 LEFT_OUT = 180.0
 """Degrees of direction for a photo that the program left out: it has no place, so it is wrong."""
+MEASURES = (
+    ("Rotation error, median (degrees)", "pose_rotation_median", "no motion", "true_rotation_median"),
+    ("Direction error, median (degrees)", "pose_direction_median", "", ""),
+    ("Rotation error of placed photos, median (degrees)", "rotation_placed_median", "", ""),
+    ("Direction error of placed photos, median (degrees)", "direction_placed_median", "", ""),
+    ("Right pose (5 / 15 degrees)", "pose_right_share", "", ""),
+    ("Pose AUC at 5 degrees", "pose_auc_5", "", ""),
+    ("Pose AUC at 10 degrees", "pose_auc_10", "", ""),
+    ("Pose AUC at 20 degrees", "pose_auc_20", "", ""),
+    ("Second photo found its place", "placed", "", ""),
+    ("Depth AbsRel, each photo's scale aligned", "depth_abs_rel", "one depth", "depth_abs_rel_flat"),
+    ("Depth AbsRel, median photo", "depth_abs_rel_median", "", ""),
+    ("Depth delta < 1.25", "depth_delta1", "", ""),
+    ("PSNR of the photo between, covered pixels (dB)", "psnr", "first photo", "psnr_first_photo"),
+    ("PSNR of the photo between, median pair (dB)", "psnr_median", "mean colour", "psnr_mean_colour"),
+    ("... from the pose fitted to it, pixels covered from there (dB)", "psnr_aligned", "", ""),
+    ("SSIM of the photo between, covered pixels", "ssim", "", ""),
+    ("PSNR of the photo between, whole picture (dB)", "psnr_whole_picture", "", ""),
+    ("... from the pose fitted to it (dB), whole picture", "psnr_whole_picture_aligned", "", ""),
+    ("LPIPS of the photo between (VGG), whole picture", "lpips_whole_picture", "", ""),
+    ("... from the pose fitted to it", "lpips_whole_picture_aligned", "", ""),
+    ("SSIM of the photo between, whole picture, Gaussian window", "ssim_whole_picture", "", ""),
+    ("Share of the photo between that is covered", "covered", "", ""),
+    ("Reconstruction, seconds a pair", "seconds", "", ""),
+)  # fmt: skip
+BY_GAP = ("pairs", "placed", "true_rotation_median", "pose_rotation_median", "pose_direction_median",
+          "pose_right_share", "depth_abs_rel", "psnr")  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -58,17 +74,16 @@ class Triple:
     second: str
     apart: int
 
+    @property
+    def name(self) -> str:
+        return f"{self.first}-{self.second}"
+
 
 @dataclass
-class Tally:
+class Tally(Noted):
     """Numbers per pair, by name, and the error of each pose."""
 
-    numbers: dict[str, list[float]] = field(default_factory=dict)
     poses: list[PoseError] = field(default_factory=list)
-
-    def note(self, **values: float) -> None:
-        for name, value in values.items():
-            self.numbers.setdefault(name, []).append(float(value))
 
 
 def chosen_triples(ids: Sequence[str], count: int = PAIRS, apart: Sequence[int] = APART) -> list[Triple]:
@@ -98,19 +113,10 @@ def chosen_triples(ids: Sequence[str], count: int = PAIRS, apart: Sequence[int] 
 def run_posed(
     folder: PhotoFolder,
     triples: Sequence[Triple],
-    render: Render,
-    weights: Path | None = None,
-    *,
-    preset: str = "mini",
-    size: int | None = None,
-    lpips: Lpips | None = None,
-    align: bool = False,
+    bench: Bench,
     progress: Progress = lambda stage, fraction: None,
 ) -> dict:
     """Judge a checkpoint on pairs of a posed folder.
-
-    Args:
-        render: draws a scene. size: as `reconstruct` has it. align: also from fitted poses.
 
     Returns:
         Plain JSON: "measures" over all pairs, "by_gap" the medians and means for each distance in number.
@@ -118,73 +124,29 @@ def run_posed(
     Raises:
         InputError: the folder lacks a pose. WeightsError: the checkpoint does not fit.
     """
-    by_gap: dict[int, list[Tally]] = {}
-    tallies = pair_tallies(
-        folder, triples, render, weights, preset=preset, size=size, lpips=lpips, align=align
+    cases = ((triple.name, triple) for triple in triples)
+    tallies = judged(
+        cases, lambda triple, _: judge(folder, triple, bench), count=len(triples), progress=progress
     )
-    for done, (triple, (name, tally)) in enumerate(zip(triples, tallies, strict=True), start=1):
-        progress(f"pair {name}", done / len(triples))
-        by_gap.setdefault(triple.apart, []).append(tally)
+    by_gap: dict[int, list[Tally]] = {}
+    for triple in triples:
+        by_gap.setdefault(triple.apart, []).append(tallies[triple.name])
     return {
-        "weights": str(weights) if weights else preset,
+        "weights": bench.made_with,
         "folder": folder.root.name,
         "pairs": len(triples),
-        "measures": summary(merged([tally for several in by_gap.values() for tally in several])),
+        "measures": summary(merged(list(tallies.values()))),
         "by_gap": {str(gap): summary(merged(several)) for gap, several in sorted(by_gap.items())},
     }
 
 
-def pair_tallies(
-    folder: PhotoFolder,
-    triples: Sequence[Triple],
-    render: Render,
-    weights: Path | None = None,
-    *,
-    preset: str = "mini",
-    size: int | None = None,
-    lpips: Lpips | None = None,
-    align: bool = False,
-    shelf: Shelf | None = None,
-    look: Look | None = None,
-) -> Iterator[tuple[str, Tally]]:
-    """Name and tally of every pair, in order; those on the shelf are not judged again."""
-    networks = Networks()
-
-    def judge(triple: Triple) -> Tally:
-        tally = Tally()
-        options = {"weights": weights, "preset": preset, "size": size, "lpips": lpips, "align": align}
-        judge_triple(folder, triple, render, tally, **options, look=look, networks=networks)
-        return tally
-
-    return collected(((key_of(t), t) for t in triples), judge, shelf)
-
-
 @torch.no_grad()
-def judge_triple(
-    folder: PhotoFolder,
-    triple: Triple,
-    render: Render,
-    tally: Tally,
-    *,
-    weights: Path | None = None,
-    preset: str = "mini",
-    size: int | None = None,
-    lpips: Lpips | None = None,
-    align: bool = False,
-    look: Look | None = None,
-    networks: Networks | None = None,
-) -> None:
-    """Pose, depth and the photo from between of one pair; adds to `tally`."""
+def judge(folder: PhotoFolder, triple: Triple, bench: Bench, look: Look | None = None) -> Tally:
+    """Pose, depth and the photo from between of one pair."""
+    tally, render = Tally(), bench.render
     first, between, second = (folder.photo(id) for id in (triple.first, triple.between, triple.second))
     to_second, to_between = relative(first, second), relative(first, between)
-    scene, seconds = scene_of(
-        (first, second),
-        lenses_of((first, second)),
-        weights=weights,
-        preset=preset,
-        size=size,
-        networks=networks,
-    )
+    scene, seconds = bench.scene_of((first, second))
     placed = scene.num_views == 2
     predicted = scene.viewmats[1].cpu() if placed else torch.eye(4)
     error = pose_error(predicted, to_second.float())
@@ -202,20 +164,17 @@ def judge_triple(
     if math.isnan(scale) and placed:
         scale = float(to_second[:3, 3].norm() / predicted[:3, 3].norm().clamp_min(1e-9))
     if math.isnan(scale):
-        return
+        return tally
     target = as_seen(between, scene.view_size)
-    camera = moved_camera(to_between, scale, target, scene.view_size)
-    frame = render(scene, camera)
-    judge_picture(frame, target, tally, truths[0], lpips)
-    if align:
-        judge_aligned(scene, render, camera, target, tally, lpips)
+    frame = judge_view(scene, to_between, scale, target, truths[0], bench, tally)
     if look is not None:
         look(_sight(triple, truths[0], target, frame, tally))
+    return tally
 
 
 def _sight(triple: Triple, first: FittedPhoto, target: FittedPhoto, frame: Frame, tally: Tally) -> Sight:
     """The pair for people, with the numbers that its tally ended with."""
-    start, truth = (p.rgb.permute(1, 2, 0).float() / 255 for p in (first, target))
+    start, truth = map(picture_of, (first, target))
     pictures = {
         "first photo": photo_picture(start),
         "photo between": photo_picture(truth),
@@ -226,65 +185,7 @@ def _sight(triple: Triple, first: FittedPhoto, target: FittedPhoto, frame: Frame
     numbers = {name: known[name] for name in ("psnr", "covered", "depth_abs_rel") if name in known}
     numbers["rotation error"] = tally.poses[-1].rotation
     name = f"photos {triple.first} and {triple.second}"
-    return Sight(key_of(triple), name, pictures, numbers, numbers.get("psnr", 0.0))
-
-
-def key_of(triple: Triple) -> str:
-    """What a pair's tally is kept as."""
-    return f"{triple.first}-{triple.second}"
-
-
-def pose_of(photo: LabelledPhoto) -> Tensor:
-    """Camera to world (4, 4) float64.
-
-    Raises:
-        InputError: the photo has none.
-    """
-    if photo.pose is None:
-        raise InputError(
-            f"photo {photo.id} has no line in poses.txt; add it, or take the photo out of the folder"
-        )
-    return photo.pose.double()
-
-
-def relative(first: LabelledPhoto, other: LabelledPhoto) -> Tensor:
-    """World-to-camera matrix (4, 4) float64 of a photo, world = the first one's camera."""
-    return torch.linalg.inv(pose_of(other)) @ pose_of(first)
-
-
-def scene_of(
-    photos: Sequence[LabelledPhoto],
-    intrinsics: Intrinsics | Sequence[Intrinsics] | None,
-    *,
-    weights: Path | None = None,
-    preset: str = "mini",
-    size: int | None = None,
-    networks: Networks | None = None,
-) -> tuple[Scene, float]:
-    """Photos through the whole program, and the seconds that took. intrinsics and what follows: as
-    `reconstruct` has them."""
-    with files_of(photos) as paths:
-        start = time.perf_counter()
-        scene = reconstruct(
-            paths, preset=preset, weights=weights, intrinsics=intrinsics, size=size, networks=networks
-        )
-        return scene, time.perf_counter() - start
-
-
-@contextmanager
-def files_of(photos: Sequence[LabelledPhoto]) -> Iterator[list[Path]]:
-    """The photos as files of one folder, which goes."""
-    with TemporaryDirectory() as folder:
-        paths = [Path(folder) / f"{photo.id}.png" for photo in photos]
-        for path, photo in zip(paths, photos, strict=True):
-            Image.fromarray(photo.image).save(path, "PNG", compress_level=1)
-        yield paths
-
-
-def as_seen(photo: LabelledPhoto, size: tuple[int, int]) -> FittedPhoto:
-    """A photo as those of a scene were cut, whose `view_size` is given."""
-    height, width = photo.image.shape[:2]
-    return fitted(photo, size, centre_box(width, height, size))
+    return Sight(triple.name, name, pictures, numbers, numbers.get("psnr", 0.0))
 
 
 def judge_depth(frames: Sequence[Frame], truths: Sequence[FittedPhoto], tally: Tally) -> float:
@@ -298,74 +199,75 @@ def judge_depth(frames: Sequence[Frame], truths: Sequence[FittedPhoto], tally: T
             continue
         if view == 0:
             scale = float((depths[valid] / frame.depths[valid]).median())
-        aligned = align_scale(frame.depths, depths)
-        tally.note(
-            depth_abs_rel=abs_rel(aligned, depths),
-            depth_delta1=delta1(aligned, depths),
-            depth_abs_rel_flat=abs_rel(align_scale(torch.ones_like(depths), depths), depths),
-        )
+        tally.note(**depth_measures(frame.depths, depths))
     return scale
 
 
-def moved_camera(viewmat: Tensor, scale: float, photo: FittedPhoto, size: tuple[int, int]) -> Camera:
-    """The camera of a photo in the scene's units, of which one is `scale` of the pose's."""
-    moved = viewmat.float().clone()
-    moved[:3, 3] /= scale
-    return Camera(moved, photo.K, *size)
+def judge_view(
+    scene: Scene,
+    viewmat: Tensor,
+    scale: float,
+    photo: FittedPhoto,
+    first: FittedPhoto,
+    bench: Bench,
+    tally: Tally,
+) -> Frame:
+    """The scene from where a photo was taken that it was not made of: pixels that the scene covers, and all
+    of them; with `bench.align` also from the pose that fits the photo best, as papers without poses judge.
 
-
-def judge_aligned(
-    scene: Scene, render: Render, camera: Camera, photo: FittedPhoto, tally: Tally, lpips: Lpips | None = None
-) -> None:
-    """The same picture from the pose that fits the photo best, as papers without poses judge; the numbers
-    say "aligned"."""
-    truth = photo.rgb.permute(1, 2, 0).float() / 255
-    plain = bare_scene(scene.gaussians, "colours")  # no weight maps are drawn
-    frame = render(plain, aligned_camera(lambda at: render(plain, at), camera, truth))
+    Args:
+        viewmat: (4, 4), world = the first photo's camera. scale: its lengths per scene unit.
+    """
+    placed = viewmat.float().clone()
+    placed[:3, 3] /= scale
+    camera = Camera(placed, photo.K, *scene.view_size)
+    truth, start = map(picture_of, (photo, first))
+    frame = bench.render(scene, camera)
+    _judge_picture(frame, truth, "", bench, tally)
+    tally.note(ssim_whole_picture=ssim(frame.rgb, truth))
     shown = frame.alphas >= ANSWERING.covered_alpha
-    tally.note(psnr_whole_picture_aligned=psnr(frame.rgb, truth))
-    if bool(shown.any()):
-        tally.note(psnr_aligned=psnr(frame.rgb[shown], truth[shown]))
-    if lpips is not None:
-        tally.note(lpips_whole_picture_aligned=lpips.whole(frame.rgb.cpu()[None], truth[None])[0])
-
-
-def judge_picture(
-    frame: Frame, photo: FittedPhoto, tally: Tally, first: FittedPhoto, lpips: Lpips | None = None
-) -> None:
-    """The scene from where a photo was taken that it was not made of; pixels that the scene covers, and all
-    of them."""
-    truth, start = (p.rgb.permute(1, 2, 0).float() / 255 for p in (photo, first))
-    shown = frame.alphas >= ANSWERING.covered_alpha
-    tally.note(
-        covered=float(shown.float().mean()),
-        psnr_whole_picture=psnr(frame.rgb, truth),
-        ssim_whole_picture=ssim(frame.rgb, truth),
-    )
-    if lpips is not None:
-        tally.note(lpips_whole_picture=lpips.whole(frame.rgb.cpu()[None], truth[None])[0])
+    tally.note(covered=float(shown.float().mean()))
     if bool(shown.any()):
         flat = truth[shown].mean(0).expand_as(truth)
         tally.note(
-            psnr=psnr(frame.rgb[shown], truth[shown]),
             ssim=float(ssim_map(frame.rgb.clamp(0, 1), truth)[shown].mean()),
             psnr_first_photo=psnr(start[shown], truth[shown]),
             psnr_mean_colour=psnr(flat[shown], truth[shown]),
         )
+    if bench.align:
+        plain = bare_scene(scene.gaussians, "colours")  # no weight maps are drawn
+        fitted = aligned_camera(lambda at: bench.render(plain, at), camera, truth)
+        _judge_picture(bench.render(plain, fitted), truth, "_aligned", bench, tally)
+    return frame
+
+
+def _judge_picture(frame: Frame, truth: Tensor, end: str, bench: Bench, tally: Tally) -> None:
+    """PSNR of what is covered and of all, and LPIPS; names end so."""
+    shown = frame.alphas >= ANSWERING.covered_alpha
+    tally.note(**{f"psnr_whole_picture{end}": psnr(frame.rgb, truth)})
+    if bool(shown.any()):
+        tally.note(**{f"psnr{end}": psnr(frame.rgb[shown], truth[shown])})
+    if bench.lpips is not None:
+        tally.note(**{f"lpips_whole_picture{end}": bench.lpips.whole(frame.rgb.cpu()[None], truth[None])[0]})
 
 
 def summary(tally: Tally) -> dict[str, float | None]:
     """Means, medians and shares, rounded."""
-    measures = {name: nan_mean(values) for name, values in tally.numbers.items()}
-    for name in ("depth_abs_rel", "psnr", "true_rotation", "rotation_placed", "direction_placed"):
-        if name in tally.numbers:
-            measures[f"{name}_median"] = float(torch.tensor(tally.numbers[name]).nanmedian())
-    measures |= {
-        "pose_rotation_median": float(torch.tensor([e.rotation for e in tally.poses]).nanmedian()),
-        "pose_direction_median": float(torch.tensor([e.direction for e in tally.poses]).nanmedian()),
+    medians = ("depth_abs_rel", "psnr", "true_rotation", "rotation_placed", "direction_placed")
+    measures = {
+        **tally.means(),
+        **{f"{name}_median": tally.median(name) for name in medians if name in tally.numbers},
+        **pose_measures(tally.poses),
         "pose_right_share": nan_mean(float(error.right()) for error in tally.poses),
         "pairs": float(len(tally.poses)),
     }
-    areas = pose_auc([error.worst for error in tally.poses])
-    measures |= {f"pose_auc_{limit:g}": area for limit, area in zip(POSE_LIMITS, areas, strict=True)}
     return rounded(dict(sorted(measures.items())))
+
+
+def tables(result: dict) -> list[Table]:
+    """All pairs, and by how many numbers they are apart."""
+    measures = [Measure(key.replace("_", " "), key) for key in BY_GAP]
+    return [
+        measures_table("", MEASURES, result["measures"]),
+        by_row("", "numbers apart", result["by_gap"], measures),
+    ]

@@ -10,8 +10,8 @@ hides the worst: it is told beside it.
 """
 
 import time
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -24,14 +24,11 @@ from langflash_core.base.picture_files import opened_picture
 from langflash_core.base.running import Progress
 from langflash_core.errors import InputError
 from langflash_core.images.pictures import centre_box
-from langflash_core.lab.evaluation.labelled import Render
-from langflash_core.lab.evaluation.lpips import Lpips
-from langflash_core.lab.evaluation.numbers import rounded
-from langflash_core.lab.evaluation.real_measures import likeness
-from langflash_core.lab.evaluation.walk_scenes import wordless
+from langflash_core.lab.evaluation import bench as benches
+from langflash_core.lab.evaluation.bench import wordless
+from langflash_core.lab.evaluation.sharp_measures import likeness
+from langflash_core.lab.evaluation.tables import Measure, Numbers, Table, markdown, number, rounded
 from langflash_core.lab.training.measures import nan_mean
-from langflash_core.pipeline import reconstruct
-from langflash_core.reconstruction.networks import Networks
 from langflash_core.surface.fused import fuse_layers
 from langflash_core.types import Camera, Scene
 
@@ -44,19 +41,26 @@ Shown = Callable[[str, str, str, Tensor], None]
 """Is given "own" or "between", a frame's name, a title and a picture (H, W, 3)."""
 
 
-@dataclass(frozen=True)
-class Bench:
-    """What scenes are made and judged with. render: draws one in the light of the place. fused: judged
-    is the one surface that formats of splats get (`surface.fused`). alone: whether fewer photos stand
-    beside. lpips: None leaves it out."""
+MEASURES = (
+    Measure("PSNR, light fitted (dB)", "psnr", ".2f"),
+    Measure("structure (1 is the photo)", "structure"),
+    Measure("fog (%)", "fog", "share"),
+    Measure("LPIPS", "lpips"),
+    Measure("covered (%)", "covered", "share"),
+)
+_KINDS = {
+    OWN: ("at the photos' own places", "that photo alone"),
+    BETWEEN: ("at frames held back", "the two photos around it alone"),
+}
 
-    render: Render
-    weights: Path | None = None
-    size: int | None = None
+
+@dataclass(frozen=True)
+class Bench(benches.Bench):
+    """Draws scenes in the light of the place. fused: judged is the one surface that formats of splats get
+    (`surface.fused`). alone: whether fewer photos stand beside."""
+
     fused: bool = False
     alone: bool = True
-    lpips: Lpips | None = None
-    networks: Networks = field(default_factory=Networks, repr=False, compare=False)
 
 
 @dataclass(frozen=True)
@@ -129,9 +133,9 @@ def judge(
     scene = _made(kept, walk, bench)
     took = {"seconds": time.perf_counter() - start, "cpu_seconds": time.process_time() - cpu}
     rows: dict[str, dict] = {OWN: {}, BETWEEN: {}}
-    for number, frame in enumerate((*kept, *held)):
-        progress(frame.name, 0.5 + 0.5 * number / (len(kept) + len(held)))
-        kind = OWN if number < len(kept) else BETWEEN
+    for done, frame in enumerate((*kept, *held)):
+        progress(frame.name, 0.5 + 0.5 * done / (len(kept) + len(held)))
+        kind = OWN if done < len(kept) else BETWEEN
         fewer = _fewer(frame, kept, walk, bench) if bench.alone else None
         rows[kind][frame.name] = rounded(_row(kind, frame, scene, fewer, walk, bench, shown))
     once = {"photos": len(kept), "placed": share}
@@ -139,7 +143,7 @@ def judge(
 
 
 def _walked(frames: Sequence[Path], bench: Bench) -> _Walk:
-    scene = reconstruct(frames, weights=bench.weights, size=bench.size, networks=bench.networks)
+    scene = bench.scene(frames)
     placed = {name: view for view, name in enumerate(scene.record.photos)}
     known = tuple(frame for frame in frames if frame.name in placed)
     views = [placed[frame.name] for frame in known]
@@ -163,14 +167,7 @@ def _lens(scene: Scene, frame: Path) -> tuple[float, float, float, float]:
 
 def _made(frames: Sequence[Path], walk: _Walk, bench: Bench) -> Scene:
     """The scene of some frames in the walk's world, without its language, which costs time to draw."""
-    scene = reconstruct(
-        frames,
-        weights=bench.weights,
-        size=bench.size,
-        viewmats=walk.viewmats_of(frames),
-        intrinsics=walk.lens,
-        networks=bench.networks,
-    )
+    scene = bench.scene(frames, viewmats=walk.viewmats_of(frames), intrinsics=walk.lens)
     return wordless(fuse_layers(scene) if bench.fused else scene)
 
 
@@ -245,3 +242,34 @@ def _keys(rows: list[dict]) -> list[str]:
 
 def _rows(case: dict) -> list[tuple[str, list[dict]]]:
     return [(kind, list(case[kind].values())) for kind in (OWN, BETWEEN) if case[kind]]
+
+
+def real_markdown(result: Mapping) -> str:
+    """Of each number of photos a table: means, the worst frame in brackets; beside it what fewer bring."""
+    return "\n".join(markdown(_tables(case), _about(case)) for case in result["cases"])
+
+
+def _about(case: Mapping) -> str:
+    share = Measure("", "", "share").told(number(case["placed"]))
+    return (
+        f"{case['photos']} photos, {share} % of the frames placed, {case['gaussians']:,.0f} Gaussians, "
+        f"{case['seconds']:.1f} s, {case['cpu_seconds']:.1f} s of the processor"
+    )
+
+
+def _tables(case: Mapping) -> list[Table]:
+    tables = []
+    for kind, (title, alone) in _KINDS.items():
+        if case[kind]:
+            means, worst = case["mean"][kind], case["worst"][kind]
+            begins = ("", f"{ALONE}_")
+            told = [(m.title, *(_told(m, begin, means, worst) for begin in begins)) for m in MEASURES]
+            rows = [row for row in told if set(row[1:]) != {"-"}]
+            tables.append(Table("", (f"{title}, {len(case[kind])}", "scene", alone), rows))
+    return tables
+
+
+def _told(measure: Measure, begin: str, means: Numbers, worst: Numbers) -> str:
+    low = worst.get(begin + measure.key)
+    mean = measure.told(means.get(begin + measure.key))
+    return mean if low is None else f"{mean} ({measure.told(low)})"

@@ -7,43 +7,29 @@ not judged again, unless weights or options changed.
 
 import hashlib
 import math
-from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
 from langflash_core.base.running import Progress
-from langflash_core.errors import InputError
-from langflash_core.lab.evaluation import labelled, posed
+from langflash_core.lab.evaluation import labelled, posed, sharp, sides
 from langflash_core.lab.evaluation.ablations import study
 from langflash_core.lab.evaluation.ablations.tables import ablation_plots, ablation_tables
 from langflash_core.lab.evaluation.ablations.tables import summary as ablation_summary
-from langflash_core.lab.evaluation.lpips import Lpips
-from langflash_core.lab.evaluation.photo_tables import LABEL_LISTS, PHOTOS, POSED
-from langflash_core.lab.evaluation.photo_tables import METHODS as PHOTO_METHODS
-from langflash_core.lab.evaluation.posed import APART, PAIRS, chosen_triples, pair_tallies
-from langflash_core.lab.evaluation.report_parts import (
-    Gallery,
-    Plot,
-    Point,
-    Section,
-    Table,
-    labels_table,
-    measures_table,
-)
-from langflash_core.lab.evaluation.report_sharp import Tally as Sharp
-from langflash_core.lab.evaluation.report_sharp import sharp_report_tables, sharp_summary, sharp_tallies
-from langflash_core.lab.evaluation.report_sides import Tally as Sides
-from langflash_core.lab.evaluation.report_sides import side_summary, side_tables, side_tallies
+from langflash_core.lab.evaluation.bench import Bench
+from langflash_core.lab.evaluation.posed import APART, PAIRS, chosen_triples
+from langflash_core.lab.evaluation.report_parts import Gallery, Plot, Point, Section
 from langflash_core.lab.evaluation.rooms import run as rooms
+from langflash_core.lab.evaluation.rooms.summary import COLUMNS, MEASURES, METHODS
 from langflash_core.lab.evaluation.rooms.summary import summary as room_summary
 from langflash_core.lab.evaluation.rooms.tally import Tally as RoomTally
-from langflash_core.lab.evaluation.sharp import WAYS, Bench
 from langflash_core.lab.evaluation.sharp_subjects import Subject, posed_subjects, room_subjects
+from langflash_core.lab.evaluation.side_subjects import Case, room_cases
 from langflash_core.lab.evaluation.sights import Look
 from langflash_core.lab.evaluation.speed import PAPER_MS
-from langflash_core.lab.evaluation.tables import COLUMNS, MEASURES, METHODS
-from langflash_core.lab.evaluation.tallies import Shelf, identity, intervals, merged
+from langflash_core.lab.evaluation.tables import Intervals, Table, labels_table, measures_table
+from langflash_core.lab.evaluation.tallies import Rows, Shelf, identity, intervals, judged, merged
 from langflash_core.lab.photos import PhotoFolder
 from langflash_core.lab.rooms import RoomRenderer, load_pack
 
@@ -86,22 +72,16 @@ class Sources:
 
 @dataclass(frozen=True)
 class Workplace:
-    """render: draws scenes; folder: where tallies and pictures are kept; weights, preset: as everywhere."""
+    """bench: makes and draws scenes; folder: where tallies and pictures are kept."""
 
-    render: labelled.Render
+    bench: Bench
     folder: Path
-    weights: Path | None = None
-    preset: str = "mini"
     progress: Progress = lambda stage, fraction: None
-    lpips: Lpips | None = None
 
     def shelf(self, section: str, kind: type, **key: object) -> Shelf:
-        key = {
-            "weights": identity(self.weights, self.preset),
-            "lpips": self.lpips and self.lpips.digest,
-            **key,
-        }
-        return Shelf(self.folder / section, key, kind)
+        weights = identity(self.bench.weights, self.bench.preset)
+        known = {"weights": weights, "lpips": self.bench.lpips and self.bench.lpips.digest}
+        return Shelf(self.folder / section, {**known, **key}, kind)
 
 
 def plans(sources: Sources) -> list[Callable[[Workplace], Section]]:
@@ -125,87 +105,121 @@ def plans(sources: Sources) -> list[Callable[[Workplace], Section]]:
     return judges
 
 
+def section_of(
+    place: Workplace,
+    shelf: Shelf,
+    title: str,
+    about: str,
+    cases: Iterable[tuple[str, Any]],
+    count: int,
+    judge: Callable[[Any, Look], Any],
+    summary: Callable[[Any], Mapping[str, Any]],
+    tables: Callable[[dict, Intervals], Sequence[Table]],
+    plots: Callable[[dict, Intervals], Sequence[Plot]] = lambda result, bounds: (),
+) -> Section:
+    """Cases judged into a section of the shelf's name.
+
+    Args:
+        about: "{count}", "{first}" and "{last}" stand for how many cases there are, and for their names.
+        judge: of a case, with whom to show a picture of it.
+    """
+    gallery, name = Gallery(shelf.folder / "pictures"), shelf.folder.name
+    kept = judged(
+        cases,
+        lambda case, _: judge(case, gallery.add),
+        count=count,
+        shelf=shelf,
+        progress=lambda stage, fraction: place.progress(f"{name}: {stage}", fraction),
+    )
+    tallies, names = list(kept.values()), list(kept)
+    result = {"scenes": len(kept), **summary(merged(tallies))}
+    bounds = intervals(tallies, summary, draws=DRAWS)
+    return Section(
+        name,
+        title,
+        about.format(count=len(kept), first=names[0], last=names[-1]),
+        result,
+        bounds,
+        tables(result, bounds),
+        plots(result, bounds),
+        gallery.shown(names, WORST, BEST),
+    )
+
+
 def rooms_section(data: Path, place: Workplace, limit: int | None = None) -> Section:
     """Furnished rooms whose furniture no training saw, every rival in the same run."""
+    bench = place.bench
     setting, held_out = rooms.open_rooms(
-        data, place.weights, preset=place.preset, limit=limit, lpips=place.lpips
+        data, bench.weights, preset=bench.preset, limit=limit, lpips=bench.lpips
     )
-    shelf = place.shelf("rooms", RoomTally, data=str(data.resolve()), groups=setting.groups)
-    kept, gallery = _told(
-        place, shelf, len(held_out), lambda look: rooms.room_tallies(setting, held_out, shelf, look)
-    )
-    result, bounds = _summed(kept, lambda tally: room_summary(tally, setting))
-    seeds = sorted(map(int, kept))
-    about = (
-        f"{len(kept)} rooms, seeds {seeds[0]} to {seeds[-1]}, furniture held out from training; two photos "
-        "make the scene, a third view judges it where a photo sees the surface."
-    )
-    columns = {column: column.replace("_", " ").replace("miou", "mIoU") for column in COLUMNS}
-    return Section(
-        "rooms",
-        "Rooms",
-        about,
-        {"scenes": len(kept), **result},
-        bounds,
-        (
+
+    def tables(result: dict, bounds: Intervals) -> list[Table]:
+        title = "Labels, every rival in the same run"
+        return [
             measures_table("Measures", MEASURES, result["measures"], bounds),
-            labels_table("Labels, every rival in the same run", METHODS, columns, result["labels"], bounds),
+            labels_table(title, METHODS, COLUMNS, result["labels"], bounds),
             _stage_table(result["measures"]),
-        ),
-        _room_plots(result, bounds),
-        gallery.shown(list(kept), WORST, BEST),
+        ]
+
+    return section_of(
+        place,
+        place.shelf("rooms", RoomTally, data=str(data.resolve()), groups=setting.groups),
+        "Rooms",
+        "{count} rooms, seeds {first} to {last}, furniture held out from training; two photos make the "
+        "scene, a third view judges it where a photo sees the surface.",
+        rooms.named_records(held_out),
+        len(held_out),
+        lambda record, look: rooms.judge(setting, record, look),
+        lambda tally: room_summary(tally, setting),
+        tables,
+        _room_plots,
     )
 
 
 def ablations_section(data: Path, place: Workplace, limit: int | None = None) -> Section:
     """Which part of the method pays, on some of the rooms."""
     shelf = place.shelf("ablations", study.Tally, data=str(data.resolve()))
-    setting, count, studies = study.room_studies(
-        data,
-        place.weights,
-        limit=limit,
-        most=ABLATED,
-        shelf=shelf,
-        progress=place.progress,
+    setting, fits, count, cases = study.opened_study(
+        data, place.bench.weights, limit=limit, most=ABLATED, shelf=shelf, progress=place.progress
     )
-    kept, _ = _told(place, shelf, count, lambda look: studies)
-    result, bounds = _summed(kept, ablation_summary)
     about = (
-        f"{len(kept)} of the rooms, taken evenly; {len(setting.groups)} class groups. All rivals draw "
-        "the same Gaussians from the same camera by the same rasteriser; times are of drawing and decoding, "
-        'in one process, and "x atoms" is the mean over rooms of the ratio to the atoms in the same room.'
+        f"{{count}} of the rooms, taken evenly; {len(setting.groups)} class groups. All rivals draw the same "
+        "Gaussians from the same camera by the same rasteriser; times are of drawing and decoding, in one "
+        'process, and "x atoms" is the mean over rooms of the ratio to the atoms in the same room.'
     )
-    return Section(
-        "ablations",
+    return section_of(
+        place,
+        study.grouped_shelf(shelf, setting),
         "What pays: groups, vectors, K, and rivals",
         about,
-        {"scenes": len(kept), **result},
-        bounds,
-        ablation_tables(result),
-        ablation_plots(result, bounds),
+        cases,
+        count,
+        lambda record, look: study.judge(setting, fits, record),
+        ablation_summary,
+        lambda result, bounds: ablation_tables(result),
+        ablation_plots,
     )
 
 
 def sides_section(pack: Path, place: Workplace, limit: int | None = None) -> Section:
     """Rooms seen from aside."""
     count = min(limit or SIDES, SIDES)
-    shelf = place.shelf("sides", Sides, pack=str(pack.resolve()))
-    kept, _ = _told(
+
+    def cases() -> Iterator[tuple[str, Case]]:
+        furniture = load_pack(pack)
+        with RoomRenderer(furniture) as renderer:
+            yield from ((case.name, case) for case in room_cases(furniture, renderer, count=count))
+
+    return section_of(
         place,
-        shelf,
-        count,
-        lambda look: side_tallies(
-            pack, count, place.render, place.weights, preset=place.preset, lpips=place.lpips, shelf=shelf
-        ),
-    )
-    result, bounds = _summed(kept, side_summary)
-    return Section(
-        "sides",
+        place.shelf("sides", Rows, pack=str(pack.resolve())),
         "Rooms seen from aside",
-        f"{len(kept)} rooms, drawn from 10 to 45 degrees aside and from over and under.",
-        {"scenes": len(kept), **result},
-        bounds,
-        side_tables(result),
+        "{count} rooms, drawn from 10 to 45 degrees aside and from over and under.",
+        cases(),
+        count,
+        lambda case, look: Rows([sides.judge(case, place.bench)]),
+        lambda tally: sides.summary(tally.rows),
+        lambda result, bounds: sides.tables(result),
     )
 
 
@@ -218,14 +232,14 @@ def sharp_rooms_section(pack: Path, place: Workplace, limit: int | None = None) 
         with RoomRenderer(furniture) as renderer:
             yield from room_subjects(furniture, renderer, count=count)
 
-    shelf = place.shelf("sharp_rooms", Sharp, pack=str(pack.resolve()), ways=WAYS)
+    shelf = place.shelf("sharp_rooms", Rows, pack=str(pack.resolve()), ways=sharp.WAYS)
     return _sharp_section("Rooms at the photos' size", subjects(), count, place, shelf)
 
 
 def sharp_posed_section(folder: PhotoFolder, place: Workplace, limit: int | None = None) -> Section:
     """Pairs of real photos at their own size."""
     triples = chosen_triples(folder.ids, min(limit or SHARP, SHARP), APART)
-    shelf = place.shelf("sharp_posed", Sharp, **_described(folder), ways=WAYS)
+    shelf = place.shelf("sharp_posed", Rows, **_described(folder), ways=sharp.WAYS)
     subjects = posed_subjects(folder, triples)
     return _sharp_section("Real photos at their own size", subjects, len(triples), place, shelf)
 
@@ -233,87 +247,57 @@ def sharp_posed_section(folder: PhotoFolder, place: Workplace, limit: int | None
 def _sharp_section(
     title: str, subjects: Iterator[Subject], count: int, place: Workplace, shelf: Shelf
 ) -> Section:
-    bench = Bench(place.render, place.weights, place.preset, ways=WAYS, lpips=place.lpips)
-    kept, gallery = _told(place, shelf, count, lambda look: sharp_tallies(subjects, bench, shelf, look))
-    result, bounds = _summed(kept, sharp_summary)
-    about = (
-        f"{len(kept)} pairs; each scene is drawn from its photos' own places, and from that of a kept one "
-        "between, at their size, at most three times the network's grid, beside the photo through that grid."
-    )
-    return Section(
-        shelf.folder.name,
+    own = place.bench
+    bench = sharp.Bench(own.render, own.weights, own.preset, lpips=own.lpips)
+    return section_of(
+        place,
+        shelf,
         title,
-        about,
-        {"scenes": len(kept), **result},
-        bounds,
-        sharp_report_tables(result),
-        (),
-        gallery.shown(list(kept), WORST, BEST),
+        "{count} pairs; each scene is drawn from its photos' own places, and from that of a kept one "
+        "between, at their size, at most three times the network's grid, beside the photo through that grid.",
+        ((subject.name, subject) for subject in subjects),
+        count,
+        lambda subject, look: Rows([sharp.judge(subject, bench, look)]),
+        lambda tally: {"measures": sharp.summary(tally.rows)},
+        lambda result, bounds: [table for table in sharp.tables(result) if table.rows],
     )
 
 
 def posed_section(folder: PhotoFolder, place: Workplace, limit: int | None = None) -> Section:
     """Pairs of real photos whose poses somebody measured."""
     triples = chosen_triples(folder.ids, limit or PAIRS, APART)
-    shelf = place.shelf("posed", posed.Tally, **_described(folder))
-    kept, gallery = _told(
+    bench = replace(place.bench, align=True)
+    return section_of(
         place,
-        shelf,
-        len(triples),
-        lambda look: pair_tallies(
-            folder,
-            triples,
-            place.render,
-            place.weights,
-            preset=place.preset,
-            lpips=place.lpips,
-            align=True,
-            shelf=shelf,
-            look=look,
-        ),
-    )
-    result, bounds = _summed(kept, lambda tally: {"measures": posed.summary(tally)})
-    about = (
-        f"{len(kept)} pairs of {folder.root.name}, {', '.join(map(str, APART))} numbers apart; the photo "
-        "half-way between is drawn from its true place."
-    )
-    return Section(
-        "posed",
+        place.shelf("posed", posed.Tally, **_described(folder)),
         "Real photos of known poses",
-        about,
-        {"scenes": len(kept), **result},
-        bounds,
-        (measures_table("Measures", POSED, result["measures"], bounds),),
-        (),
-        gallery.shown(list(kept), WORST, BEST),
+        f"{{count}} pairs of {folder.root.name}, {', '.join(map(str, APART))} numbers apart; the photo "
+        "half-way between is drawn from its true place.",
+        ((triple.name, triple) for triple in triples),
+        len(triples),
+        lambda triple, look: posed.judge(folder, triple, bench, look),
+        lambda tally: {"measures": posed.summary(tally)},
+        lambda result, bounds: [measures_table("Measures", posed.MEASURES, result["measures"], bounds)],
     )
 
 
 def photos_section(folder: PhotoFolder, ids: Sequence[str], place: Workplace) -> Section:
     """Single real photos that somebody labelled."""
-    judged = labelled.judged_by(folder, place.render, place.weights, preset=place.preset)
-    shelf = place.shelf("photos", labelled.Tally, **_described(folder), words=len(judged.words.phrases))
-    kept, gallery = _told(
-        place, shelf, len(ids), lambda look: labelled.photo_tallies(judged, folder, ids, shelf, look)
-    )
-    result, bounds = _summed(kept, lambda tally: labelled.summary(tally, judged.words))
-    columns = {
-        f"{kind}_{what}": f"{text}: {name}"
-        for kind, text in LABEL_LISTS.items()
-        for what, name in (("miou", "mIoU"), ("accuracy", "accuracy"))
-    }
-    return Section(
-        "photos",
+    setting = labelled.Judged.of(folder, place.bench)
+    words = len(setting.words.phrases)
+    return section_of(
+        place,
+        place.shelf("photos", labelled.Tally, **_described(folder), words=words),
         "Real photos with labels",
-        f"{len(kept)} photos of {folder.root.name}, each reconstructed alone and asked as anybody would ask.",
-        {"scenes": len(kept), **result},
-        bounds,
-        (
-            measures_table("Measures", PHOTOS, result["measures"], bounds),
-            labels_table("Labels", PHOTO_METHODS, columns, result["labels"], bounds),
-        ),
-        (),
-        gallery.shown(list(kept), WORST, BEST),
+        f"{{count}} photos of {folder.root.name}, each reconstructed alone and asked as anybody would ask.",
+        ((id, id) for id in ids),
+        len(ids),
+        lambda id, look: labelled.judge(setting, folder.photo(id), look),
+        lambda tally: labelled.summary(tally, setting.words),
+        lambda result, bounds: [
+            measures_table("Measures", labelled.MEASURES, result["measures"], bounds),
+            labels_table("Labels", labelled.METHODS, labelled.COLUMNS, result["labels"], bounds),
+        ],
     )
 
 
@@ -328,29 +312,6 @@ def _described(folder: PhotoFolder) -> dict[str, object]:
         "folder": str(folder.root.resolve()),
         "described": hashlib.sha256(said.encode()).hexdigest()[:16],
     }
-
-
-def _told(
-    place: Workplace, shelf: Shelf, count: int, run: Callable[[Look], Iterator[tuple[str, Any]]]
-) -> tuple[dict[str, Any], Gallery]:
-    """Tallies by name as they come, with progress, and the gallery of their sights."""
-    section = shelf.folder.name
-    gallery = Gallery(shelf.folder / "pictures")
-    kept: dict[str, Any] = {}
-    place.progress(section, 0.0)
-    for name, tally in run(gallery.add):
-        kept[name] = tally
-        place.progress(f"{section}: {name}, {len(kept)} of {count}", len(kept) / max(count, 1))
-    if not kept:
-        raise InputError(f"no scene of the section {section} was judged; give a source that holds some")
-    return kept, gallery
-
-
-def _summed(
-    kept: Mapping[str, Any], summary: Callable[[Any], Mapping[str, Any]]
-) -> tuple[dict[str, Any], dict[str, list[float] | None]]:
-    tallies = list(kept.values())
-    return dict(summary(merged(tallies))), intervals(tallies, summary, draws=DRAWS)
 
 
 def _stages(measures: Mapping[str, float | None]) -> dict[str, float]:

@@ -3,7 +3,8 @@
 from collections.abc import Mapping
 from typing import Any
 
-from langflash_core.lab.evaluation.report_parts import Plot, Point, Section, Table
+from langflash_core.lab.evaluation.report_parts import Plot, Point, Section
+from langflash_core.lab.evaluation.tables import Table
 
 _COLUMNS = (
     ("times_default", "time of a frame", ".2f"),

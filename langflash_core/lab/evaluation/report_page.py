@@ -9,8 +9,9 @@ from dataclasses import dataclass
 from html import escape
 from typing import Any
 
-from langflash_core.lab.evaluation.report_parts import Section, Shown, Table, table_lines
+from langflash_core.lab.evaluation.report_parts import Section, Shown
 from langflash_core.lab.evaluation.report_plot import svg
+from langflash_core.lab.evaluation.tables import Table, table_lines
 from langflash_core.lab.evaluation.tallies import numbers_of
 
 _STYLE = """

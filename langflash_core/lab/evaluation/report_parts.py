@@ -13,27 +13,10 @@ import numpy as np
 from PIL import Image
 
 from langflash_core.base.files import make_folder, write_atomically
-from langflash_core.lab.evaluation.case_tables import span
 from langflash_core.lab.evaluation.sights import Sight
-from langflash_core.lab.evaluation.tables import cell
+from langflash_core.lab.evaluation.tables import Table
 
 JPEG_QUALITY = 82
-
-
-@dataclass(frozen=True)
-class Table:
-    """Texts; the first column names the row."""
-
-    title: str
-    header: tuple[str, ...]
-    rows: Sequence[tuple[str, ...]]
-
-
-def table_lines(table: Table) -> list[str]:
-    """Lines of Markdown."""
-    rows = [table.header, tuple("---" for _ in table.header), *table.rows]
-    lines = ["| " + " | ".join(text.replace("|", "/") for text in row) + " |" for row in rows]
-    return [f"**{table.title}**", "", *lines] if table.title else lines
 
 
 @dataclass(frozen=True)
@@ -85,45 +68,6 @@ class Section:
     tables: Sequence[Table]
     plots: Sequence[Plot] = ()
     scenes: Sequence[Shown] = field(default_factory=tuple)
-
-
-def measures_table(
-    title: str,
-    rows: Sequence[tuple[str, str, str, str]],
-    measures: Mapping[str, float | None],
-    intervals: Mapping[str, Sequence[float] | None],
-) -> Table:
-    """Measures with intervals and a trivial rival; what was not measured is left out.
-
-    Args:
-        rows: text, key of the measure, name of the rival, its key.
-    """
-    kept = []
-    for text, key, rival, rival_key in rows:
-        if measures.get(key) is not None:
-            other = f"{cell(measures[rival_key])} ({rival})" if measures.get(rival_key) is not None else ""
-            kept.append((text, cell(measures[key]), span(intervals.get(f"measures/{key}")), other))
-    return Table(title, ("measure", "value", "95 % of draws", "trivial rival"), kept)
-
-
-def labels_table(
-    title: str,
-    methods: Mapping[str, str],
-    columns: Mapping[str, str],
-    labels: Mapping[str, Mapping[str, float | None]],
-    intervals: Mapping[str, Sequence[float] | None],
-) -> Table:
-    """Methods by columns, with intervals; columns that nobody has are left out."""
-    known = [c for c in columns if any(row.get(c) is not None for row in labels.values())]
-    rows = []
-    for method, text in methods.items():
-        if method in labels:
-            cells = (
-                f"{cell(labels[method].get(c))} {span(intervals.get(f'labels/{method}/{c}'))}".strip()
-                for c in known
-            )
-            rows.append((text, *cells))
-    return Table(title, ("labels by", *(columns[c] for c in known)), rows)
 
 
 class Gallery:

@@ -16,8 +16,8 @@ from textwrap import fill
 from typing import Any
 
 from langflash_core.lab.evaluation.report_page import Report, document_of
-from langflash_core.lab.evaluation.report_parts import Table, table_lines
 from langflash_core.lab.evaluation.report_plot import svg
+from langflash_core.lab.evaluation.tables import Table, table_lines
 
 LINE = 110
 """Letters of a document's line."""

@@ -13,8 +13,8 @@ Sizes: H W pixels.
 
 import math
 import time
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 
@@ -26,9 +26,9 @@ from langflash_core.base.detail import DEFAULT_DETAIL
 from langflash_core.base.files import make_folder
 from langflash_core.base.running import Progress
 from langflash_core.errors import InputError
-from langflash_core.lab.evaluation.labelled import Render
+from langflash_core.lab.evaluation import bench as benches
+from langflash_core.lab.evaluation.bench import Render, as_seen, picture_of, wordless
 from langflash_core.lab.evaluation.lpips import Lpips
-from langflash_core.lab.evaluation.numbers import rounded
 from langflash_core.lab.evaluation.sharp_measures import (
     check_pictures,
     crop_camera,
@@ -43,15 +43,25 @@ from langflash_core.lab.evaluation.sharp_measures import (
     true_detail,
     window_side,
 )
-from langflash_core.lab.evaluation.sharp_subjects import Subject, picture_of, size_of
+from langflash_core.lab.evaluation.sharp_subjects import Subject, size_of
 from langflash_core.lab.evaluation.side_measures import Similarity, seen_by
 from langflash_core.lab.evaluation.side_subjects import Look, photo_look
-from langflash_core.lab.evaluation.sides import aligned, camera_of, covered_depths, number
+from langflash_core.lab.evaluation.sides import aligned, camera_of, covered_depths
+from langflash_core.lab.evaluation.sights import Look as Shown
+from langflash_core.lab.evaluation.sights import Sight, closeups
+from langflash_core.lab.evaluation.tables import (
+    Measure,
+    Pairs,
+    Table,
+    by_measure,
+    number,
+    rounded,
+    told_difference,
+)
+from langflash_core.lab.evaluation.tallies import Rows, judged
 from langflash_core.lab.training.measures import nan_mean, psnr
-from langflash_core.pipeline import reconstruct
-from langflash_core.reconstruction.networks import Networks
 from langflash_core.scene.file import load, save
-from langflash_core.types import NO_LANGUAGE, Camera, Record, Scene, Semantics
+from langflash_core.types import Camera, Scene
 
 PLAIN = "plain"
 WAYS = (PLAIN, DEFAULT_DETAIL)
@@ -62,36 +72,43 @@ ENLARGED = 8
 """Times the photo's size, at which surfaces must still let nothing through."""
 FLATTEST = 4
 """So many flat windows of a photo are enlarged."""
-Pictures = Mapping[str, Tensor]
 
 
-def make_scene(paths: Sequence[Path], way: str, **options) -> Scene:
-    """A scene of photos, made in one of the ways.
-
-    Args:
-        way: `PLAIN`, or the name of a detail. options: as `reconstruct` has them.
-
-    Raises:
-        InputError: there is no such way.
-    """
-    return reconstruct(paths, detail=None if way == PLAIN else way, **options)
+_PICTURE = (
+    Measure("PSNR (dB)", "psnr", ".2f"),
+    Measure("LPIPS", "lpips"),
+    Measure("detail, of the photo's", "detail"),
+    Measure("detail in its place, of the photo's", "true_detail"),
+    Measure("lattice on flat walls (1/255)", "lattice", ".2f"),
+    Measure("opaque (% of pixels)", "opaque", ".1%"),
+    Measure("light from behind (%)", "through", ".1%"),
+    Measure("opaque at eight times that size (%)", "opaque_8x", ".1%"),
+    Measure("ripple of flat walls there (1/255)", "ripple", ".2f"),
+    Measure("seen by a photo (%)", "seen", ".1%"),
+)
+_SCENE = (
+    Measure("Gaussians", "gaussians", ",.0f"),
+    Measure("bytes of its file", "bytes", ",.0f"),
+    Measure("seconds to make it", "seconds", ".2f"),
+)
+GROUPS = {
+    "photos": ("The photos' own places, at the photo's size", _PICTURE),
+    "between": ("A kept photo from between, at its size", _PICTURE),
+    "between_small": ("A kept photo from between, at the network's size", _PICTURE[:-1]),
+    "once": ("A scene", _SCENE),
+}
+"""Title and measures of each group."""
+_TITLES = {GRID: "photo through the grid", OTHER: "other version"}
 
 
 @dataclass(frozen=True)
-class Bench:
-    """What scenes are made and judged with. render: draws one; weights, preset, size: as `reconstruct` has
-    them; ways: how they are made; lpips: None leaves it out; beside: a folder of NAME.langflash of another
-    version; keep: where scenes are written, WAY/NAME.langflash."""
+class Bench(benches.Bench):
+    """ways: how scenes are made. beside: a folder of NAME.langflash of another version. keep: where scenes
+    are written, WAY/NAME.langflash."""
 
-    render: Render
-    weights: Path | None = None
-    preset: str = "mini"
-    size: int | None = None
     ways: tuple[str, ...] = WAYS
-    lpips: Lpips | None = None
     beside: Path | None = None
     keep: Path | None = None
-    networks: Networks = field(default_factory=Networks, repr=False, compare=False)
 
 
 @dataclass(frozen=True)
@@ -135,20 +152,19 @@ def run_sharp(
     Raises:
         InputError: there is no subject, or a way or a scene beside is missing.
     """
-    rows = []
-    for done, subject in enumerate(subjects):
-        progress(subject.name, done / max(count, 1))
-        rows.append(judge(subject, bench))
-    if not rows:
-        raise InputError("there is nothing to judge; give at least one pair, triple or room")
-    made_with = str(bench.weights) if bench.weights else bench.preset
-    return {"weights": made_with, "ways": list(bench.ways), **summary(rows)}
+    tallies = judged(
+        ((subject.name, subject) for subject in subjects),
+        lambda subject, _: Rows([judge(subject, bench)]),
+        count=count,
+        progress=progress,
+    )
+    rows = [row for tally in tallies.values() for row in tally.rows]
+    made = {"weights": bench.made_with, "ways": list(bench.ways)}
+    return {**made, "measures": summary(rows), "cases": rows}
 
 
-def judge(
-    subject: Subject, bench: Bench, shown: Callable[[str, Pictures], None] = lambda name, pictures: None
-) -> dict:
-    """Numbers of one subject: "columns" by name, each with its groups.
+def judge(subject: Subject, bench: Bench, shown: Shown | None = None) -> dict:
+    """Numbers of one subject: "columns" by name, each with its groups. shown: gets close-ups.
 
     Raises:
         InputError: as `run_sharp`.
@@ -157,7 +173,7 @@ def judge(
     grid = made[0].scene.view_size
     views = range(min(column.scene.num_views for column in made))
     photos = [subject.photo(view) for view in views]
-    own = [Truth(picture_of(photo, size_of(photo, grid))) for photo in photos]
+    own = [Truth(picture_of(as_seen(photo, size_of(photo, grid)))) for photo in photos]
     pictures = {"photo": own[0].rgb}
     with torch.no_grad():
         kept = _kept(subject, grid, len(views))
@@ -165,8 +181,16 @@ def judge(
         for column in made:
             columns[column.name], pictures[column.name] = _scene_row(column, own, kept, bench)
     pictures[GRID] = on_grid(own[0].rgb, grid)
-    shown(subject.name, pictures)
+    if shown is not None:
+        shown(_sight(subject.name, pictures, columns[bench.ways[-1]]["photos"]))
     return {"name": subject.name, "grid": list(grid), "size": list(own[0].size), "columns": columns}
+
+
+def _sight(name: str, pictures: Mapping[str, Tensor], row: Mapping[str, float]) -> Sight:
+    """Close-ups, with the numbers of the last way from the photos' own places."""
+    told = ("psnr", "lpips", "detail", "opaque")
+    numbers = {key: row[key] for key in told if row.get(key) is not None}
+    return Sight(name, name, closeups(pictures, 1), numbers, numbers.get("psnr", 0.0))
 
 
 def _columns(subject: Subject, bench: Bench) -> Iterator[Column]:
@@ -175,36 +199,26 @@ def _columns(subject: Subject, bench: Bench) -> Iterator[Column]:
     with subject.files() as paths, TemporaryDirectory() as folder:
         for way in bench.ways:
             start = time.perf_counter()
-            scene = make_scene(
-                paths,
-                way,
-                intrinsics=subject.intrinsics,
-                weights=bench.weights,
-                preset=bench.preset,
-                size=bench.size,
-                networks=bench.networks,
-            )
+            detailed = None if way == PLAIN else way
+            scene = bench.scene(paths, detail=detailed, intrinsics=subject.intrinsics)
             seconds = time.perf_counter() - start
             path = (bench.keep or Path(folder)) / way / f"{subject.name}.langflash"
             make_folder(path.parent)
             save(scene, path)
             sizes.add(scene.view_size)
-            yield Column(way, _wordless(scene), path.stat().st_size, seconds)
+            yield Column(way, _flat(scene), path.stat().st_size, seconds)
     if bench.beside is not None:
         path = bench.beside / f"{subject.name}.langflash"
         scene = load(path)
         if scene.view_size not in sizes:
             saw = " x ".join(map(str, scene.view_size))
             raise InputError(f"{path} saw its photos at {saw}, not as here; make it with the same --size")
-        yield Column(OTHER, _wordless(scene), path.stat().st_size, math.nan)
+        yield Column(OTHER, _flat(scene), path.stat().st_size, math.nan)
 
 
-def _wordless(scene: Scene) -> Scene:
-    """The scene without language, so that nobody draws weight maps at eight times the photo's size."""
-    count = len(scene.gaussians)
-    ids = torch.zeros(count, 0, dtype=torch.int64)
-    nothing = Semantics(ids, torch.zeros(count, 0), torch.zeros(0, 0), NO_LANGUAGE)
-    return replace(scene, semantics=nothing, record=Record(light=scene.record.light))
+def _flat(scene: Scene) -> Scene:
+    """One layer without language, so that nobody draws weight maps at eight times the photo's size."""
+    return wordless(scene).with_record(layered=False)
 
 
 @dataclass(frozen=True)
@@ -245,7 +259,9 @@ def _kept(subject: Subject, grid: tuple[int, int], placed: int) -> Kept | None:
         if not bool(small.any()):
             return None
         large = torch.nn.functional.interpolate(small[None, None].float(), size=size[::-1])[0, 0] > 0.5
-    return Kept(look, photos, Truth(picture_of(subject.between, size), large), Truth(look.rgb, small))
+    return Kept(
+        look, photos, Truth(picture_of(as_seen(subject.between, size)), large), Truth(look.rgb, small)
+    )
 
 
 def _grid_row(own: Sequence[Truth], kept: Kept | None, grid: tuple[int, int], lpips: Lpips | None) -> dict:
@@ -331,7 +347,7 @@ def _means(rows: Sequence[Mapping[str, float]]) -> dict[str, float | None]:
     return rounded({key: nan_mean(number(row.get(key)) for row in rows) for key in rows[0]})
 
 
-def summary(rows: Sequence[dict]) -> dict:
+def summary(rows: Sequence[dict]) -> dict[str, dict[str, dict]]:
     """Means over cases by column and group, so that every case counts alike."""
     measures: dict[str, dict[str, dict]] = {}
     for column in dict.fromkeys(name for row in rows for name in row["columns"]):
@@ -341,4 +357,46 @@ def summary(rows: Sequence[dict]) -> dict:
             keys = dict.fromkeys(key for numbers in found for key in numbers)
             means = {key: nan_mean(number(numbers.get(key)) for numbers in found) for key in keys}
             measures.setdefault(column, {})[group] = rounded(means)
-    return {"measures": measures, "cases": list(rows)}
+    return measures
+
+
+def tables(result: dict) -> list[Table]:
+    """Means of each group, a column a column; and what the last way has before every other one."""
+    means = [means_table(result["measures"], group) for group in GROUPS]
+    return [*means, differences_table(result)] if "cases" in result else means
+
+
+def means_table(measures: Mapping[str, Mapping[str, Mapping]], group: str) -> Table:
+    """A row a measure."""
+    title, told = GROUPS[group]
+    columns = {_TITLES.get(c, c): measures[c][group] for c in _ordered(measures) if group in measures[c]}
+    return by_measure(title, "measure", columns, told)
+
+
+def differences_table(result: dict) -> Table:
+    """The last way minus each rival, case by case; a row a measure of a group."""
+    own, cases = result["ways"][-1], result["cases"]
+    rivals = [column for column in _ordered(result["measures"]) if column != own]
+    rows = []
+    for group, (title, measures) in GROUPS.items():
+        for measure in measures:
+            pairs = [paired(cases, own, rival, group, measure.key) for rival in rivals]
+            cells = [told_difference(measure, each) for each in pairs]
+            if any(cell != "-" for cell in cells):
+                rows.append((f"{title}: {measure.title}", *cells))
+    header = (f"{own} minus", *(_TITLES.get(rival, rival) for rival in rivals))
+    return Table(f"Differences over {len(cases)}, mean ± standard error", header, rows)
+
+
+def paired(cases: Sequence[Mapping], own: str, rival: str, group: str, key: str) -> Pairs:
+    """A measure of a rival and of a column, case by case."""
+    rows = [row["columns"] for row in cases]
+    first, second = (
+        [number(row.get(column, {}).get(group, {}).get(key)) for row in rows] for column in (rival, own)
+    )
+    return list(zip(first, second, strict=True))
+
+
+def _ordered(measures: Mapping[str, object]) -> list[str]:
+    """The grid first, the other version last."""
+    return sorted(measures, key=lambda column: (column != GRID, column == OTHER))

@@ -18,6 +18,9 @@ from torch import Tensor
 from torch.nn import functional as F
 
 from langflash_core.errors import InputError
+from langflash_core.lab.evaluation.walk_measures import lit
+from langflash_core.lab.training.losses import structural_similarity
+from langflash_core.lab.training.measures import psnr
 from langflash_core.types import LUMA, Camera
 
 OPAQUE = 0.99
@@ -28,6 +31,14 @@ FLAT = 4 / 255
 """Standard deviation of a photo's grey in a window below which it is a flat wall."""
 PERIODS = 8
 """Sides of a window, so that noise of deviation s reads as a lattice of only .06 s at a period of 3."""
+
+
+_WINDOW = 7
+"""Pixels, the side of what is around a pixel: a table's leg, and not the table."""
+_FOGGED = 0.25
+"""Of the photo's own local contrast, below which a pixel is fog."""
+SIGMA, RADIUS = 1.5, 5
+"""Of the Gaussian window of SSIM: 11 x 11 pixels."""
 
 
 def grey_of(rgb: Float[Tensor, "H W 3"]) -> Float[Tensor, "H W"]:
@@ -220,3 +231,75 @@ def spread_windows(size: tuple[int, int], side: int, count: int = 3) -> list[tup
         for y in places
         for x in places
     ]
+
+
+# Whatever its light: for real walks, whose mean of squared errors hides fog.
+
+
+def in_its_light(drawn: Float[Tensor, "H W 3"], photo: Float[Tensor, "H W 3"]) -> Float[Tensor, "H W 3"]:
+    """What is drawn in the photo's light: a gain and an offset a channel, by least squares, within [0, 1]."""
+    return lit(drawn.reshape(-1, 3), photo.reshape(-1, 3)).reshape(drawn.shape).clamp(0, 1)
+
+
+def structure(drawn: Float[Tensor, "H W 3"], photo: Float[Tensor, "H W 3"]) -> float:
+    """Correlation of the horizontal differences of grey: 1 of the photo itself, about .3 and less of fog."""
+    check_pictures(drawn, photo)
+    ours, theirs = (grey_of(picture).diff(dim=1).double().flatten() for picture in (drawn, photo))
+    ours, theirs = ours - ours.mean(), theirs - theirs.mean()
+    norms = float(ours.norm() * theirs.norm())
+    return float(ours @ theirs) / norms if norms > 0 else math.nan
+
+
+def fog(drawn: Float[Tensor, "H W 3"], photo: Float[Tensor, "H W 3"]) -> float:
+    """Share of the pixels around which the photo is no flat wall, where what is drawn has less than a quarter
+    of its contrast: the standard deviation of grey in 7 x 7 pixels."""
+    check_pictures(drawn, photo)
+    made, truth = _contrast(drawn), _contrast(photo)
+    textured = truth >= FLAT
+    return float((made < _FOGGED * truth)[textured].float().mean()) if bool(textured.any()) else math.nan
+
+
+def _contrast(picture: Tensor) -> Tensor:
+    """(h, w) of the whole windows."""
+    side = min(_WINDOW, *picture.shape[:2])
+    windows = F.unfold(grey_of(picture).double()[None, None], side)[0]  # (side^2, h w)
+    return windows.std(0, correction=0)
+
+
+def likeness(drawn: Float[Tensor, "H W 3"], photo: Float[Tensor, "H W 3"]) -> dict[str, float]:
+    """PSNR in the photo's light, structure and fog."""
+    shown = in_its_light(drawn, photo)
+    return {
+        "psnr": psnr(shown, photo),
+        "structure": structure(drawn, photo),
+        "fog": fog(shown, photo),
+    }
+
+
+# As papers on novel views report it; the SSIM of the losses, under a box, is in `training.losses`.
+
+
+def ssim(rendered: Tensor, photo: Tensor) -> float:
+    """Mean structural similarity with a Gaussian window; in [-1, 1], 1 for equal pictures.
+
+    As scikit-image's `structural_similarity(gaussian_weights=True, sigma=1.5, use_sample_covariance=
+    False, data_range=1)`, which leaves the window's radius out at the picture's edges.
+
+    Raises:
+        ValueError: the pictures differ in size, or are smaller than the window.
+
+    Source: Wang, Bovik, Sheikh, Simoncelli 2004.
+    """
+    if rendered.shape != photo.shape or min(photo.shape[:2]) <= 2 * RADIUS:
+        sizes = f"{tuple(rendered.shape)}, {tuple(photo.shape)}"
+        raise ValueError(f"rendered, photo: expected one size above {2 * RADIUS} pixels, received {sizes}")
+    first, second = (p.double().clamp(0, 1).permute(2, 0, 1)[:, None] for p in (rendered, photo))
+    return float(structural_similarity(first, second, _smooth).mean())
+
+
+def _smooth(maps: Tensor) -> Tensor:
+    """(C, 1, H, W) under the window, (C, 1, H - 10, W - 10): only where the whole window fits."""
+    steps = torch.arange(-RADIUS, RADIUS + 1, dtype=maps.dtype)
+    line = torch.exp(-(steps**2) / (2 * SIGMA**2))
+    line = line / line.sum()
+    return F.conv2d(F.conv2d(maps, line[None, None, :, None]), line[None, None, None, :])

@@ -9,12 +9,9 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
-from tempfile import TemporaryDirectory
 
 import numpy as np
 import torch
-from PIL import Image
-from torch import Tensor
 
 from langflash_core.base.resources import asset_path
 from langflash_core.errors import InputError
@@ -22,11 +19,12 @@ from langflash_core.geometry.cameras import invert_rigid
 from langflash_core.images.decode import read_photo
 from langflash_core.images.lens import Intrinsics
 from langflash_core.images.pictures import centre_box
-from langflash_core.lab.evaluation.posed import Triple, as_seen, key_of
+from langflash_core.lab.evaluation.bench import files_of
+from langflash_core.lab.evaluation.posed import Triple
 from langflash_core.lab.photos import LabelledPhoto, PhotoFolder
 from langflash_core.lab.photos.folder import lenses_of
-from langflash_core.lab.rooms import Pack, RoomRenderer, RoomViews, staged_room
-from langflash_core.lab.training.commands import cache_plan
+from langflash_core.lab.rooms import Pack, RoomRenderer, RoomViews
+from langflash_core.lab.training.commands import set_rooms
 from langflash_core.surface.settings import LAYERS
 
 _LEFT = re.compile(r"(.+)_left")
@@ -49,14 +47,10 @@ class Subject:
     @contextmanager
     def files(self) -> Iterator[tuple[Path, ...]]:
         """The photos as files; pictures lie in a folder that goes."""
-        with TemporaryDirectory() as folder:
-            paths = []
-            for photo in self.photos:
-                path = photo if isinstance(photo, Path) else Path(folder) / f"{photo.id}.png"
-                if isinstance(photo, LabelledPhoto):
-                    Image.fromarray(photo.image).save(path, "PNG", compress_level=1)
-                paths.append(path)
-            yield tuple(paths)
+        known = [photo for photo in self.photos if isinstance(photo, LabelledPhoto)]
+        with files_of(known) as paths:
+            kept = iter(paths)
+            yield tuple(photo if isinstance(photo, Path) else next(kept) for photo in self.photos)
 
     def photo(self, view: int) -> LabelledPhoto:
         """One of the photos, decoded.
@@ -84,11 +78,6 @@ def size_of(photo: LabelledPhoto, grid: tuple[int, int]) -> tuple[int, int]:
     """`sharp_size` of a decoded photo."""
     height, width = photo.image.shape[:2]
     return sharp_size((width, height), grid)
-
-
-def picture_of(photo: LabelledPhoto, size: tuple[int, int]) -> Tensor:
-    """The photo's centre at a size (width, height), by Lanczos: (H, W, 3) in [0, 1]."""
-    return as_seen(photo, size).rgb.permute(1, 2, 0).float() / 255
 
 
 def pair_subjects(photos: Sequence[Path] = ()) -> list[Subject]:
@@ -137,7 +126,7 @@ def posed_subjects(folder: PhotoFolder, triples: Sequence[Triple]) -> Iterator[S
     """Pairs of a posed folder, and the photo from half-way between."""
     for triple in triples:
         first, between, second = (folder.photo(id) for id in (triple.first, triple.between, triple.second))
-        yield Subject(key_of(triple), (first, second), between)
+        yield Subject(triple.name, (first, second), between)
 
 
 def room_subjects(
@@ -154,15 +143,9 @@ def room_subjects(
     Args:
         kind: "held_out" or "validation".
     """
-    plan = cache_plan(kind, count)
-    for shard in plan.shards():
-        width, height = (side * times for side in shard.size)
-        for seed in range(shard.first_seed, shard.first_seed + shard.count):
-            staged = staged_room(
-                seed, pack, renderer, num_views=3, size=(height, width), libraries=plan.libraries
-            )
-            first_photo, second, between = (_photo_of(staged.views, view) for view in range(3))
-            yield Subject(str(seed), (first_photo, second), between)
+    for staged in set_rooms(pack, renderer, kind, count, times=times):
+        first, second, between = (_photo_of(staged.views, view) for view in range(3))
+        yield Subject(str(staged.views.seed), (first, second), between)
 
 
 def _photo_of(views: RoomViews, view: int) -> LabelledPhoto:

@@ -9,7 +9,6 @@ from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-import torch
 from jaxtyping import Bool, Float
 from scipy.ndimage import binary_dilation, maximum_filter, minimum_filter
 
@@ -295,8 +294,3 @@ def angle_between(
 def quantile(values: Float[np.ndarray, " n"], share: float) -> float:
     """NaN of nothing."""
     return float(np.quantile(values, share)) if len(values) else math.nan
-
-
-def as_array(values: torch.Tensor) -> np.ndarray:
-    """Float64 on the processor."""
-    return values.detach().cpu().double().numpy()

@@ -13,19 +13,13 @@ from torch import Tensor
 
 from langflash_core.errors import InputError
 from langflash_core.geometry.fusion import DepthView
-from langflash_core.images.lens import Intrinsics
-from langflash_core.lab.evaluation.posed import Triple, as_seen, relative
-from langflash_core.lab.evaluation.side_measures import (
-    angle_between,
-    as_array,
-    seen_by,
-    turned_about,
-)
+from langflash_core.lab.evaluation.bench import as_array, as_seen, picture_of, relative
+from langflash_core.lab.evaluation.posed import Triple
+from langflash_core.lab.evaluation.side_measures import angle_between, seen_by, turned_about
 from langflash_core.lab.photos import LabelledPhoto, PhotoFolder
-from langflash_core.lab.photos.folder import lenses_of
-from langflash_core.lab.rooms import Pack, RoomRenderer, StagedRoom, staged_room
+from langflash_core.lab.rooms import Pack, RoomRenderer, StagedRoom
 from langflash_core.lab.rooms.cameras import stands_free
-from langflash_core.lab.training.commands import cache_plan
+from langflash_core.lab.training.commands import set_rooms
 
 ANGLES = (10, 20, 30, 45)
 """Degrees around what the photos look at, to the left and to the right."""
@@ -71,10 +65,6 @@ class Case:
     photos: tuple[LabelledPhoto, ...]
     truth: Callable[[tuple[int, int]], Subject]
 
-    @property
-    def intrinsics(self) -> tuple[Intrinsics, ...] | None:
-        return lenses_of(self.photos)
-
 
 def centre_depth(depths: Float[np.ndarray, "H W"]) -> float:
     """Median of what is known in the middle half of a picture, of either side: what it looks at."""
@@ -106,19 +96,8 @@ def room_cases(
     Args:
         kind: "held_out" or "validation".
     """
-    plan = cache_plan(kind, count)
-    for shard in plan.shards():
-        width, height = shard.size
-        for seed in range(shard.first_seed, shard.first_seed + shard.count):
-            staged = staged_room(
-                seed,
-                pack,
-                renderer,
-                num_views=shard.views,
-                size=(height, width),
-                libraries=plan.libraries,
-            )
-            yield staged_case(staged, renderer)
+    for staged in set_rooms(pack, renderer, kind, count):
+        yield staged_case(staged, renderer)
 
 
 def staged_case(staged: StagedRoom, renderer: RoomRenderer) -> Case:
@@ -185,11 +164,7 @@ def posed_cases(folder: PhotoFolder, triples: Sequence[Triple]) -> Iterator[Case
     for triple in triples:
         photos = tuple(folder.photo(id) for id in (triple.first, triple.second))
 
-        def truth(
-            size: tuple[int, int],
-            triple: Triple = triple,
-            photos: tuple[LabelledPhoto, ...] = photos,
-        ) -> Subject:
+        def truth(size: tuple[int, int], triple: Triple = triple, photos: tuple = photos) -> Subject:
             own = tuple(photo_look(photo, photos[0], size, "0") for photo in photos)
             if not (own[0].view.depths > 0).any():
                 raise InputError(
@@ -199,22 +174,18 @@ def posed_cases(folder: PhotoFolder, triples: Sequence[Triple]) -> Iterator[Case
             aside = _looks_aside(folder, triple, photos[0], own, size)
             return Subject(own, tuple(_worth([between, *aside], own)))
 
-        yield Case(f"{triple.first}-{triple.second}", photos, truth)
+        yield Case(triple.name, photos, truth)
 
 
 def photo_look(photo: LabelledPhoto, first: LabelledPhoto, size: tuple[int, int], group: str) -> Look:
     """A photo of a posed folder at a size (width, height); world: the first photo's camera."""
     seen = as_seen(photo, size)
     view = DepthView(as_array(seen.depths), as_array(relative(first, photo)), as_array(seen.K))
-    return Look(photo.id, group, view, seen.rgb.permute(1, 2, 0).float() / 255)
+    return Look(photo.id, group, view, picture_of(seen))
 
 
 def _looks_aside(
-    folder: PhotoFolder,
-    triple: Triple,
-    first: LabelledPhoto,
-    own: Sequence[Look],
-    size: tuple[int, int],
+    folder: PhotoFolder, triple: Triple, first: LabelledPhoto, own: Sequence[Look], size: tuple[int, int]
 ) -> list[Look]:
     assert first.pose is not None and folder.poses is not None
     pivot = pivot_of(own[0].view)

@@ -9,24 +9,18 @@ Sizes: H W pixels of the network's photos.
 """
 
 import math
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 
 import numpy as np
 import torch
 
 from langflash_core.base.running import Progress
-from langflash_core.errors import InputError
 from langflash_core.geometry.fusion import DepthView
-from langflash_core.lab.evaluation.labelled import Render
-from langflash_core.lab.evaluation.lpips import Lpips
+from langflash_core.lab.evaluation.bench import Bench, Render, as_array
 from langflash_core.lab.evaluation.metrics import pose_error
-from langflash_core.lab.evaluation.numbers import rounded
-from langflash_core.lab.evaluation.posed import scene_of
 from langflash_core.lab.evaluation.side_measures import (
     Similarity,
-    as_array,
     boundary_f1,
     fitted_similarity,
     layer_gaps,
@@ -38,32 +32,60 @@ from langflash_core.lab.evaluation.side_measures import (
     sheets,
 )
 from langflash_core.lab.evaluation.side_subjects import Case, Look, Subject
+from langflash_core.lab.evaluation.tables import (
+    Measure,
+    Numbers,
+    Pairs,
+    Table,
+    by_measure,
+    by_row,
+    number,
+    rounded,
+)
+from langflash_core.lab.evaluation.tallies import Rows, judged
 from langflash_core.lab.training.losses import ssim_map
 from langflash_core.lab.training.measures import nan_mean, psnr
 from langflash_core.language.settings import ANSWERING
-from langflash_core.reconstruction.networks import Networks
 from langflash_core.scene.gaps import fill_gaps
 from langflash_core.types import Camera, Frame, Scene
 
 PERCEIVED = ("0", "20")
 """Groups of looks that LPIPS judges: half a second a picture, so not all."""
+FILLED = "_filled"
+"""Ends what is measured with gaps filled. A version that did not fill them showed its holes black."""
+LOOKS = (
+    Measure("PSNR, holes black (dB)", "psnr"),
+    Measure("PSNR of what is covered (dB)", "psnr_covered"),
+    Measure("PSNR, gaps filled (dB)", "psnr_filled"),
+    Measure("SSIM", "ssim"),
+    Measure("LPIPS, holes black", "lpips"),
+    Measure("LPIPS, gaps filled", "lpips_filled"),
+    Measure("sheets (% of drawn)", "sheets", "share"),
+    Measure("holes (% of seen)", "holes", "share"),
+    Measure("seen by a photo (%)", "seen", "share"),
+)
+ONCE = (
+    Measure("Depth boundaries in the photos, F1", "boundary_f1"),
+    Measure("Layers: distance of the two photos' surfaces, median (% of depth)", "layers_median", "share"),
+    Measure("Layers, 90th percentile (% of depth)", "layers_p90", "share"),
+    Measure("Distance of drawn points from their true places, median (% of depth)", "misfit", "share"),
+    Measure("Rotation error, median (degrees)", "rotation_median"),
+    Measure("Direction error, median (degrees)", "direction_median"),
+    Measure("Second photo found its place", "placed"),
+    Measure("Reconstruction, seconds", "seconds"),
+)
 
 
 def run_sides(
     cases: Iterable[Case],
     count: int,
-    render: Render,
-    weights: Path | None = None,
-    *,
-    preset: str = "mini",
-    size: int | None = None,
-    lpips: Lpips | None = None,
+    bench: Bench,
     progress: Progress = lambda stage, fraction: None,
 ) -> dict:
     """Judge a checkpoint, and the code that runs it.
 
     Args:
-        count: of the cases. render: draws a scene. size: as `reconstruct` has it. lpips: None leaves it out.
+        count: of the cases.
 
     Returns:
         Plain JSON: "cases" with the numbers of each, "measures" and "by_look" their means.
@@ -71,17 +93,21 @@ def run_sides(
     Raises:
         InputError: there is no case. WeightsError: the checkpoint does not fit.
     """
-    judged, networks = [], Networks()
-    for done, case in enumerate(cases):
-        progress(case.name, done / max(count, 1))
-        scene, seconds = scene_of(
-            case.photos, case.intrinsics, weights=weights, preset=preset, size=size, networks=networks
-        )
-        row = judge(scene, case.truth(scene.view_size), render, lpips)
-        judged.append({"name": case.name, "seconds": round(seconds, 3), **row})
-    if not judged:
-        raise InputError("there is nothing to judge; ask for at least one room or pair")
-    return {"weights": str(weights) if weights else preset, **summary(judged)}
+    named = ((case.name, case) for case in cases)
+    tallies = judged(named, lambda case, _: Rows([judge(case, bench)]), count=count, progress=progress)
+    rows = [row for tally in tallies.values() for row in tally.rows]
+    return {"weights": bench.made_with, **summary(rows), "cases": rows}
+
+
+def judge(case: Case, bench: Bench) -> dict:
+    """Numbers of one case: "looks" by name, each with its "group", and what its scene has once.
+
+    Raises:
+        InputError: its truth is not known. WeightsError: the checkpoint does not fit.
+    """
+    scene, seconds = bench.scene_of(case.photos)
+    row = judge_scene(scene, case.truth(scene.view_size), bench)
+    return {"name": case.name, "seconds": round(seconds, 3), **row}
 
 
 @dataclass(frozen=True)
@@ -94,12 +120,9 @@ class Drawn:
 
 
 @torch.no_grad()
-def judge(scene: Scene, subject: Subject, render: Render, lpips: Lpips | None = None) -> dict:
-    """Numbers of one scene: "looks" by name, each with its "group", and what the scene has once.
-
-    Args:
-        scene: of `subject.photos`; photos without a place are the last ones, and left out.
-    """
+def judge_scene(scene: Scene, subject: Subject, bench: Bench) -> dict:
+    """Numbers of a scene of `subject.photos`; photos without a place are the last ones, and left out."""
+    render = bench.render
     placed = subject.photos[: scene.num_views]
     own = [render(scene, scene.camera(view)) for view in range(len(placed))]
     depths = [covered_depths(frame) for frame in own]
@@ -116,7 +139,7 @@ def judge(scene: Scene, subject: Subject, render: Render, lpips: Lpips | None = 
     for look in subject.others:
         pictures.append(Drawn(look, render(scene, camera_of(look, fit)), seen_by(look.view, photos)))
     looks = {
-        drawn.look.name: {"group": drawn.look.group, **rounded(_judged(drawn, fit, levels, lpips))}
+        drawn.look.name: {"group": drawn.look.group, **rounded(_judged(drawn, fit, levels, bench))}
         for drawn in pictures
     }
     gaps = layers(scene, placed, render)
@@ -172,9 +195,7 @@ def camera_of(look: Look, fit: Similarity) -> Camera:
     return Camera(viewmat, K, *look.size)
 
 
-def _judged(
-    drawn: Drawn, fit: Similarity, levels: Sequence[DepthView], lpips: Lpips | None
-) -> dict[str, float]:
+def _judged(drawn: Drawn, fit: Similarity, levels: Sequence[DepthView], bench: Bench) -> dict[str, float]:
     look, seen = drawn.look, drawn.seen
     depths = covered_depths(drawn.frame) * fit.scale
     covered = int((depths > 0).sum())
@@ -189,9 +210,9 @@ def _judged(
         numbers["ssim"] = float(ssim_map(rgb.clamp(0, 1), look.rgb)[shown].mean())
         whole = fill_gaps(rgb, drawn.frame.alphas.cpu())
         numbers["psnr_filled"] = psnr(whole[shown], look.rgb[shown])
-        if lpips is not None and look.group in PERCEIVED:
-            numbers["lpips"] = lpips(rgb[None], look.rgb[None], shown[None])[0]
-            numbers["lpips_filled"] = lpips(whole[None], look.rgb[None], shown[None])[0]
+        if bench.lpips is not None and look.group in PERCEIVED:
+            numbers["lpips"] = bench.lpips(rgb[None], look.rgb[None], shown[None])[0]
+            numbers["lpips_filled"] = bench.lpips(whole[None], look.rgb[None], shown[None])[0]
     return numbers
 
 
@@ -222,23 +243,23 @@ def _pose_errors(scene: Scene, subject: Subject) -> dict[str, float]:
     return {"placed": 1.0, "rotation": error.rotation, "direction": error.direction}
 
 
-def summary(judged: Sequence[dict]) -> dict:
+def summary(rows: Sequence[dict]) -> dict:
     """Means over cases, each look's group first within its case, so that every case counts alike."""
     once = ("boundary_f1", "layers_median", "layers_p90", "misfit", "placed", "seconds")
-    measures = {key: nan_mean(number(row[key]) for row in judged) for key in once}
+    measures = {key: nan_mean(number(row[key]) for row in rows) for key in once}
     for key in ("rotation", "direction"):
-        values = [number(row[key]) for row in judged]
+        values = [number(row[key]) for row in rows]
         measures[f"{key}_median"] = float(torch.tensor(values).nanmedian())
     groups: dict[str, list[dict]] = {}
-    for row in judged:
+    for row in rows:
         for group, values in grouped(row).items():
             groups.setdefault(group, []).append(values)
     by_look = {
-        group: rounded({key: nan_mean(number(r.get(key)) for r in rows) for key in _keys(rows)})
-        | {"cases": len(rows)}
-        for group, rows in sorted(groups.items(), key=lambda item: _order(item[0]))
+        group: rounded({key: nan_mean(number(r.get(key)) for r in several) for key in _keys(several)})
+        | {"cases": len(several)}
+        for group, several in sorted(groups.items(), key=lambda item: _order(item[0]))
     }
-    return {"measures": rounded(measures), "by_look": by_look, "cases": list(judged)}
+    return {"measures": rounded(measures), "by_look": by_look}
 
 
 def grouped(row: dict) -> dict[str, dict[str, float]]:
@@ -256,11 +277,52 @@ def _keys(rows: Sequence[dict]) -> list[str]:
     return sorted({key for row in rows for key in row} - {"group"})
 
 
-def number(value: float | None) -> float:
-    """Of plain JSON: null is NaN."""
-    return math.nan if value is None else float(value)
-
-
 def _order(group: str) -> tuple[int, float, str]:
     """0, 10, 20, ... and then words."""
     return (0, float(group), "") if group.isdigit() else (1, 0.0, group)
+
+
+def tables(result: dict) -> list[Table]:
+    """What a scene has once, and what it shows by where it is seen from."""
+    looks = {place_name(group): row for group, row in result["by_look"].items()}
+    count = len(result["cases"]) if "cases" in result else result["scenes"]
+    counted = (Measure("scenes", "cases", ".0f"), *LOOKS)
+    return [
+        by_measure("Scenes", "measure", {f"mean of {count}": result["measures"]}, ONCE),
+        by_row("Looks", "seen from", looks, counted),
+    ]
+
+
+def place_name(group: str) -> str:
+    """Of a group of looks, for people."""
+    if group == "0":
+        return "the photos' own places"
+    if group == "between":
+        return "between the photos"
+    return f"{group} degrees aside" if group.isdigit() else f"{group} degrees"
+
+
+def changes(pairs: Sequence[tuple[dict, dict]]) -> Iterator[tuple[Measure, Pairs]]:
+    """What became of the same cases in another version: looks of one name against each other."""
+    for measure in ONCE:
+        key = measure.key
+        key = key.removesuffix("_median") if key.startswith(("rotation", "direction")) else key
+        title = measure.title.replace(", median (degrees)", " (degrees)")
+        values = [(number(old[key]), number(new[key])) for old, new in pairs]
+        yield Measure(title, measure.key, measure.form), values
+    looks = [tuple(map(grouped, _shared(old, new))) for old, new in pairs]
+    for group in sorted({group for before, _ in looks for group in before}, key=_order):
+        for measure in LOOKS:
+            values = [_change(old.get(group, {}), new.get(group, {}), measure.key) for old, new in looks]
+            yield Measure(f"{place_name(group)}: {measure.title}", measure.key, measure.form), values
+
+
+def _shared(old: dict, new: dict) -> list[dict]:
+    names = old["looks"].keys() & new["looks"].keys()
+    return [
+        {"looks": {name: row["looks"][name] for name in row["looks"] if name in names}} for row in (old, new)
+    ]
+
+
+def _change(old: Numbers, new: Numbers, key: str) -> tuple[float, float]:
+    return number(old.get(key, old.get(key.removesuffix(FILLED)))), number(new.get(key))

@@ -10,9 +10,11 @@ import numpy as np
 import torch
 from jaxtyping import Float, Integer, UInt8
 from torch import Tensor
+from torch.nn import functional as F
 
 from langflash_core.export.colours import heat, label_colours
 from langflash_core.export.png import to_8bit
+from langflash_core.lab.evaluation.sharp_measures import fine, grey_of
 
 Picture = UInt8[np.ndarray, "H W 3"]
 UNKNOWN = (38, 38, 42)
@@ -33,6 +35,8 @@ class Sight:
 
 
 Look = Callable[[Sight], None]
+TIMES = 3
+"""A close-up shows a third of the picture's width and height, each pixel as 3 x 3."""
 
 
 def photo_picture(rgb: Tensor) -> Picture:
@@ -74,3 +78,28 @@ def depth_picture(depths: Float[np.ndarray, "H W"], longest: float) -> Picture:
     picture = heat_picture(1 - np.clip(depths / max(longest, 1e-9), 0, 1))
     picture[depths <= 0] = UNKNOWN
     return picture
+
+
+def busiest_corner(photo: Float[Tensor, "H W 3"], height: int, width: int) -> tuple[int, int]:
+    """(top, left) of the window of that size, at least 3 x 3 pixels, with the most fine detail."""
+    energy = fine(grey_of(photo)).square()[None, None]
+    means = F.avg_pool2d(energy, (height - 2, width - 2), stride=1)[0, 0]
+    place = int(means.argmax())
+    return place // means.shape[1], place % means.shape[1]
+
+
+def closeups(pictures: Mapping[str, Tensor], times: int = TIMES) -> dict[str, UInt8[np.ndarray, "H W 3"]]:
+    """The same window of every picture, where the first one has the most detail, each pixel `times` wide.
+
+    Args:
+        pictures: (H, W, 3) in [0, 1] by title, of one size, the photo first.
+    """
+    photo = next(iter(pictures.values()))
+    height, width = (max(3, side // TIMES) for side in photo.shape[:2])
+    top, left = busiest_corner(photo, height, width)
+    return {
+        title: photo_picture(rgb[top : top + height, left : left + width])
+        .repeat(times, axis=0)
+        .repeat(times, axis=1)
+        for title, rgb in pictures.items()
+    }

@@ -1,76 +1,186 @@
-"""Results as markdown: one table of measures with their trivial rivals, one of labels by method."""
+"""Results as tables, alike for every judge: numbers of one version, or of two beside each other.
 
-MEASURES = (
-    ("Depth AbsRel, view 1", "depth_abs_rel", "constant depth", "depth_abs_rel_constant"),
-    ("Depth AbsRel, fed view 1 twice", "depth_abs_rel_view_0_twice", "", ""),
-    ("Depth AbsRel, view 1, median room", "depth_abs_rel_median", "fed view 1 twice",
-     "depth_abs_rel_view_0_twice_median"),
-    ("Depth delta < 1.25, view 1", "depth_delta1", "", ""),
-    ("Depth AbsRel in metres, no alignment", "depth_abs_rel_metric", "", ""),
-    ("View-2 points in frame 1, relative", "points_view_1", "true depth, identity pose",
-     "points_view_1_true_depth_identity_pose"),
-    ("View-2 points in frame 1, median room", "points_view_1_median", "", ""),
-    ("Rotation error, median (degrees)", "pose_rotation_median", "", ""),
-    ("Direction error, median (degrees)", "pose_direction_median", "", ""),
-    ("Pose AUC at 5 degrees", "pose_auc_5", "", ""),
-    ("Pose AUC at 10 degrees", "pose_auc_10", "", ""),
-    ("Pose AUC at 20 degrees", "pose_auc_20", "", ""),
-    ("Right pose (5 / 15 degrees), overlap >= 30 %", "pose_right_share", "", ""),
-    ("Novel view PSNR where a photo sees it (dB)", "psnr", "mean colour", "psnr_mean_colour"),
-    ("... from the pose fitted to the photo (dB)", "psnr_aligned", "", ""),
-    ("Novel view SSIM, same pixels", "ssim", "", ""),
-    ("Novel view PSNR, whole picture, holes black (dB)", "psnr_whole_picture", "", ""),
-    ("... from the pose fitted to the photo (dB), whole picture", "psnr_whole_picture_aligned", "", ""),
-    ("Novel view SSIM, whole picture, Gaussian window", "ssim_whole_picture", "", ""),
-    ("Novel view LPIPS (VGG), whole picture", "lpips_whole_picture", "", ""),
-    ("... from the pose fitted to the photo", "lpips_whole_picture_aligned", "", ""),
-    ("Share of the novel view that a photo sees", "target_seen_share", "", ""),
-    ("Panoptic quality of the novel view", "panoptic_quality", "", ""),
-    ("Panoptic quality: segmentation of pairs", "panoptic_segmentation", "", ""),
-    ("Panoptic quality: recognition", "panoptic_recognition", "", ""),
-    ("Instance IoU of the novel view, whatever it is called", "instance_iou", "", ""),
-    ("Border F of the novel view's labels", "border_f", "", ""),
-    ("Label consistency, photo 1 and novel view", "label_consistency", "", ""),
-    ("Presence precision", "presence_precision", "", ""),
-    ("Presence recall", "presence_recall", "", ""),
-    ("Presence F1", "presence_f1", "always found", "presence_f1_always_found"),
-    ("Calibration error of scores (ECE)", "calibration_error", "", ""),
-    ("IoU of plain names", "name_iou", "", ""),
-    ("IoU of other words for them", "paraphrase_iou", "", ""),
-    ("IoU of other words as a share of the names'", "paraphrase_share", "", ""),
-    ("Network, seconds for two photos", "seconds", "", ""),
-)  # fmt: skip
-METHODS = {
-    "features": "2D features per view, no 3D",
-    "averaged": "averaged atoms",
-    "averaged_named": "averaged and named atoms",
-    "lfa": "aggregated and named atoms (LFA)",
-    "true_masks_lfa": "true masks, aggregated and named",
-    "majority": 'always "wall"',
-}
-COLUMNS = (
-    "source_groups_accuracy", "source_groups_miou", "source_objects_miou", "source_paper_miou",
-    "target_groups_accuracy", "target_groups_miou", "target_objects_miou", "target_paper_miou",
-)  # fmt: skip
+A *measure* is a number by its key, with a title for people and the form it is told in. What nobody measured
+is null in JSON, NaN here, and "-" in a table.
+"""
+
+import math
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+from dataclasses import dataclass
+
+from langflash_core.lab.training.measures import nan_mean
+
+Numbers = Mapping[str, float | None]
+Pairs = Sequence[tuple[float, float]]
+"""A number of each case in the one version and in the other."""
+Intervals = Mapping[str, Sequence[float] | None]
+"""95 % of draws of scenes, low and high, by the path of a number in its result."""
 
 
-def markdown(result: dict) -> str:
-    """The two tables of a `run_eval` result."""
-    measures = result["measures"]
-    lines = ["| measure | value | trivial |", "|---|---|---|"]
-    for title, key, rival, rival_key in MEASURES:
-        if key in measures:
-            other = f"{cell(measures[rival_key])} ({rival})" if rival_key in measures else ""
-            lines.append(f"| {title} | {cell(measures[key])} | {other} |")
-    lines += ["", "| labels | " + " | ".join(c.replace("_", " ") for c in COLUMNS) + " |"]
-    lines.append("|---" * (len(COLUMNS) + 1) + "|")
-    for method, title in METHODS.items():
-        if method in result["labels"]:
-            row = result["labels"][method]
-            lines.append(f"| {title} | " + " | ".join(cell(row.get(c)) for c in COLUMNS) + " |")
-    return "\n".join(lines) + "\n"
+def rounded(values: Mapping[str, float]) -> dict[str, float | None]:
+    """Four digits; what could not be measured is null, because JSON has no NaN."""
+    return {k: None if math.isnan(v) else round(v, 4) for k, v in values.items()}
+
+
+def number(value: float | None) -> float:
+    """Of plain JSON: null is NaN."""
+    return math.nan if value is None else float(value)
+
+
+@dataclass(frozen=True)
+class Measure:
+    """title: for people, one that begins with "..." goes on from the measure before; form: as `format` has
+    it, or "share", which is told in percent."""
+
+    title: str
+    key: str
+    form: str = ".3f"
+
+    def told(self, value: float | None, sign: str = "") -> str:
+        """A value; sign: before the form, of differences."""
+        if value is None or math.isnan(value):
+            return "-"
+        if self.form == "share":
+            return format(100 * value, f"{sign}.2f")
+        return format(value, sign + self.form.removeprefix("+") if sign else self.form)
+
+
+@dataclass(frozen=True)
+class Table:
+    """Texts; the first column names the row."""
+
+    title: str
+    header: tuple[str, ...]
+    rows: Sequence[tuple[str, ...]]
+
+
+def table_lines(table: Table) -> list[str]:
+    """Lines of Markdown."""
+    rows = [table.header, tuple("---" for _ in table.header), *table.rows]
+    lines = ["| " + " | ".join(text.replace("|", "/") for text in row) + " |" for row in rows]
+    return [f"**{table.title}**", "", *lines] if table.title else lines
+
+
+def markdown(tables: Iterable[Table], *before: str) -> str:
+    """Tables that have rows, below some lines of text."""
+    lines = [part for text in before for part in (text, "")]
+    for table in tables:
+        lines += [*table_lines(table), ""] if table.rows else []
+    return "\n".join(lines).rstrip() + "\n"
+
+
+def by_measure(title: str, corner: str, columns: Mapping[str, Numbers], measures: Sequence[Measure]) -> Table:
+    """A row a measure that some column has; `columns`: numbers by what the column is called."""
+    rows = []
+    for measure in measures:
+        values = [number(column.get(measure.key)) for column in columns.values()]
+        if not all(map(math.isnan, values)):
+            rows.append((measure.title, *map(measure.told, values)))
+    return Table(title, (corner, *columns), rows)
+
+
+def by_row(title: str, corner: str, rows: Mapping[str, Numbers], measures: Sequence[Measure]) -> Table:
+    """A column a measure that some row has."""
+    known = [m for m in measures if any(row.get(m.key) is not None for row in rows.values())]
+    told = [(name, *(m.told(row.get(m.key)) for m in known)) for name, row in rows.items()]
+    return Table(title, (corner, *(m.title for m in known)), told)
 
 
 def cell(value: float | None) -> str:
     """Three digits; "-" where nothing could be measured."""
     return "-" if value is None else f"{value:.3f}"
+
+
+def span(bounds: Sequence[float] | None) -> str:
+    """(low to high), or nothing."""
+    return "" if bounds is None else f"({bounds[0]:.3f} to {bounds[1]:.3f})"
+
+
+def measures_table(
+    title: str,
+    rows: Sequence[tuple[str, str, str, str]],
+    measures: Numbers,
+    intervals: Intervals | None = None,
+) -> Table:
+    """Measures beside a trivial rival, with intervals where they are known.
+
+    Args:
+        rows: text, key of the measure, name of the rival, its key.
+    """
+    kept = [
+        (
+            text,
+            cell(measures[key]),
+            span((intervals or {}).get(f"measures/{key}")),
+            f"{cell(measures[rival_key])} ({rival})" if rival_key in measures else "",
+        )
+        for text, key, rival, rival_key in rows
+        if key in measures
+    ]
+    columns = [0, 1, *([] if intervals is None else [2]), *([3] if any(row[3] for row in kept) else [])]
+    header = ("measure", "value", "95 % of draws", "trivial rival")
+    return Table(title, _chosen(header, columns), [_chosen(row, columns) for row in kept])
+
+
+def _chosen(row: Sequence[str], columns: Sequence[int]) -> tuple[str, ...]:
+    return tuple(row[column] for column in columns)
+
+
+def labels_table(
+    title: str,
+    methods: Mapping[str, str],
+    columns: Mapping[str, str],
+    labels: Mapping[str, Numbers],
+    intervals: Intervals | None = None,
+) -> Table:
+    """Methods by columns; columns that nobody has are left out."""
+    known = [c for c in columns if any(row.get(c) is not None for row in labels.values())]
+    draws = intervals or {}
+    rows = [
+        (
+            text,
+            *(
+                f"{cell(labels[method].get(c))} {span(draws.get(f'labels/{method}/{c}'))}".strip()
+                for c in known
+            ),
+        )
+        for method, text in methods.items()
+        if method in labels
+    ]
+    return Table(title, ("labels by", *(columns[c] for c in known)), rows)
+
+
+def full_titles(measures: Iterable[Measure]) -> Iterator[Measure]:
+    """With the title of the measure before in those that go on from it."""
+    whole = ""
+    for measure in measures:
+        whole = whole if measure.title.startswith("...") else measure.title
+        own = measure.title.replace("...", f"{whole},", 1) if measure.title.startswith("...") else whole
+        yield Measure(own, measure.key, measure.form)
+
+
+def difference(pairs: Pairs) -> tuple[float, float, int]:
+    """Mean of the second minus the first over pairs without NaN, its standard error (NaN of less than two),
+    and how many pairs these are."""
+    changes = [new - old for old, new in pairs if not (math.isnan(old) or math.isnan(new))]
+    mean, count = nan_mean(changes), len(changes)
+    if count < 2:
+        return mean, math.nan, count
+    return mean, math.sqrt(sum((c - mean) ** 2 for c in changes) / (count - 1) / count), count
+
+
+def told_difference(measure: Measure, pairs: Pairs) -> str:
+    """Mean and standard error."""
+    mean, error, _ = difference(pairs)
+    return measure.told(mean, "+z") + ("" if math.isnan(error) else f" ± {measure.told(error)}")
+
+
+def beside(corner: str, changes: Iterable[tuple[Measure, Pairs]]) -> Table:
+    """Two versions over the cases that both have: means, and the mean difference with its standard error."""
+    rows = []
+    for measure, pairs in changes:
+        kept = [pair for pair in pairs if not any(map(math.isnan, pair))]
+        if kept:
+            old, new = (nan_mean(side) for side in zip(*kept, strict=True))
+            rows.append((measure.title, measure.told(old), measure.told(new), told_difference(measure, kept)))
+    return Table("", (corner, "before", "after", "difference"), rows)

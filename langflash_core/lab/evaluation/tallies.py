@@ -8,8 +8,8 @@ drawn over scenes.
 import hashlib
 import json
 import math
-from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
-from dataclasses import dataclass, fields, is_dataclass
+from collections.abc import Callable, Iterable, Mapping, Sequence
+from dataclasses import dataclass, field, fields, is_dataclass
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -19,9 +19,12 @@ from torch import Tensor
 from langflash_core import __version__
 from langflash_core.base.files import make_folder, write_atomically
 from langflash_core.base.resources import asset_path
+from langflash_core.base.running import Progress
+from langflash_core.errors import InputError
 from langflash_core.lab.evaluation.intervals import bootstrap
 from langflash_core.lab.evaluation.metrics import PoseError, Presence
 from langflash_core.lab.evaluation.segments import ClassQuality, Panoptic
+from langflash_core.lab.training.measures import nan_mean
 from langflash_core.network import PRESETS
 from langflash_core.network.checkpoints.store import part_folder
 
@@ -160,19 +163,62 @@ def identity(weights: Path | None, preset: str) -> str:
     return total.hexdigest()[:16]
 
 
-def collected(
-    items: Iterable[tuple[str, Item]],
-    judge: Callable[[Item], Any],
+@dataclass
+class Noted:
+    """Numbers per case, by name: what tallies begin with."""
+
+    numbers: dict[str, list[float]] = field(default_factory=dict)
+
+    def note(self, **values: float) -> None:
+        for name, value in values.items():
+            self.numbers.setdefault(name, []).append(float(value))
+
+    def means(self) -> dict[str, float]:
+        return {name: nan_mean(values) for name, values in self.numbers.items()}
+
+    def median(self, name: str) -> float:
+        return float(torch.tensor(self.numbers[name]).nanmedian())
+
+
+@dataclass
+class Rows:
+    """What judges without pixels to count say: a row of plain JSON a case."""
+
+    rows: list[dict] = field(default_factory=list)
+
+
+def judged(
+    cases: Iterable[tuple[str, Item]],
+    judge: Callable[[Item, Progress], Any],
+    *,
+    count: int | None = None,
     shelf: Shelf | None = None,
-) -> Iterator[tuple[str, Any]]:
-    """(name, tally) of every item: from the shelf, or judged now and kept there."""
-    for name, item in items:
+    progress: Progress = lambda stage, fraction: None,
+) -> dict[str, Any]:
+    """Tallies of cases by their names, in order; those on the shelf are not judged again.
+
+    Args:
+        judge: is given a case, and a progress of its own. count: of the cases, for the progress.
+
+    Raises:
+        InputError: there is no case.
+    """
+    found: dict[str, Any] = {}
+    for name, case in cases:
+
+        def told(stage: str, fraction: float, name: str = name) -> None:
+            progress(f"{name}: {stage}", (len(found) + fraction) / count if count else 0.0)
+
+        told(f"{len(found) + 1} of {count or 'some'}", 0.0)
         tally = None if shelf is None else shelf.read(name)
         if tally is None:
-            tally = judge(item)
+            tally = judge(case, told)
             if shelf is not None:
                 shelf.write(name, tally)
-        yield name, tally
+        found[name] = tally
+    if not found:
+        raise InputError("there is nothing to judge; give a source that holds at least one scene")
+    return found
 
 
 def numbers_of(document: Mapping[str, Any], before: str = "") -> dict[str, float]:

@@ -13,23 +13,27 @@ Sizes: H W pixels; "large" is the photo's size, at most three times the network'
 """
 
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 
 import numpy as np
 import torch
 from torch import Tensor
 
 from langflash_core.base.running import Progress
-from langflash_core.errors import InputError
 from langflash_core.lab.evaluation.alignment import aligned_camera
-from langflash_core.lab.evaluation.labelled import Render
-from langflash_core.lab.evaluation.numbers import rounded
-from langflash_core.lab.evaluation.posed import as_seen, files_of
+from langflash_core.lab.evaluation.bench import Render, as_array, as_seen, files_of, picture_of
 from langflash_core.lab.evaluation.sharp_subjects import size_of
-from langflash_core.lab.evaluation.side_measures import Similarity, as_array
-from langflash_core.lab.evaluation.sides import number
-from langflash_core.lab.evaluation.tallies import Shelf, collected
+from langflash_core.lab.evaluation.side_measures import Similarity
+from langflash_core.lab.evaluation.tables import (
+    Measure,
+    Pairs,
+    Table,
+    by_measure,
+    full_titles,
+    number,
+    rounded,
+)
+from langflash_core.lab.evaluation.tallies import Rows, Shelf, judged
 from langflash_core.lab.evaluation.walk_colmap import mapped
 from langflash_core.lab.evaluation.walk_measures import camera_errors, fitted_cameras, lit
 from langflash_core.lab.evaluation.walk_scenes import Bench, Made, made_of, true_cameras, with_lens
@@ -50,11 +54,57 @@ Shown = Callable[[str, int, str, Tensor], None]
 """Is given a walk's name, a kept frame, a title and a picture (H, W, 3) at the photo's size."""
 
 
-@dataclass
-class Tally:
-    """Numbers of one walk."""
-
-    row: dict
+MEASURES = (
+    Measure("photos placed (%)", "placed", "share"),
+    Measure("places, mean (% of the walk)", "places", "share"),
+    Measure("places, farthest (% of the walk)", "places_most", "share"),
+    Measure("rotation, mean (degrees)", "rotation", ".2f"),
+    Measure("focal length off by (%)", "focal", "share"),
+    Measure("depth AbsRel, one scale", "depth_abs_rel", ".3f"),
+    Measure("depth delta 1, one scale", "depth_delta1", ".3f"),
+    Measure("depth AbsRel, a scale per photo", "depth_own_scale", ".3f"),
+    Measure("depth AbsRel of own two photos alone", "between_alone_photos_depth_abs_rel", ".3f"),
+    Measure("PSNR at the photos' own places, as shown (dB)", "own_psnr", ".2f"),
+    Measure("PSNR between, whole (dB)", "between_psnr", ".2f"),
+    Measure("... own two photos alone", "between_alone_psnr", ".2f"),
+    Measure("... against fewer photos, same frames", "gain_psnr", "+.2f"),
+    Measure("PSNR between, covered (dB)", "between_psnr_covered", ".2f"),
+    Measure("... own two photos alone", "between_alone_psnr_covered", ".2f"),
+    Measure("PSNR between, covered, light fitted (dB)", "between_psnr_lit", ".2f"),
+    Measure("... own two photos alone", "between_alone_psnr_lit", ".2f"),
+    Measure("covered (%)", "between_covered", "share"),
+    Measure("... own two photos alone", "between_alone_covered", "share"),
+    Measure("PSNR between, pose fitted (dB)", "between_aligned_psnr", ".2f"),
+    Measure("... own two photos alone", "between_alone_aligned_psnr", ".2f"),
+    Measure("... against fewer photos, same frames", "gain_aligned_psnr", "+.2f"),
+    Measure("LPIPS between", "between_lpips", ".3f"),
+    Measure("... own two photos alone", "between_alone_lpips", ".3f"),
+    Measure("LPIPS between, pose fitted", "between_aligned_lpips", ".3f"),
+    Measure("... own two photos alone", "between_alone_aligned_lpips", ".3f"),
+    Measure("depth AbsRel between", "between_depth", ".3f"),
+    Measure("... own two photos alone", "between_alone_depth", ".3f"),
+    Measure("PSNR between at the photo's size (dB)", "between_large_psnr", ".2f"),
+    Measure("... own two photos alone", "between_alone_large_psnr", ".2f"),
+    Measure("PSNR between at the photo's size, pose fitted (dB)", "between_large_aligned_psnr", ".2f"),
+    Measure("... own two photos alone", "between_alone_large_aligned_psnr", ".2f"),
+    Measure("LPIPS between at the photo's size", "between_large_lpips", ".3f"),
+    Measure("... own two photos alone", "between_alone_large_lpips", ".3f"),
+    Measure("LPIPS between at the photo's size, pose fitted", "between_large_aligned_lpips", ".3f"),
+    Measure("... own two photos alone", "between_alone_large_aligned_lpips", ".3f"),
+    Measure("Gaussians", "gaussians", ",.0f"),
+    Measure("of these coarse", "coarse", ",.0f"),
+    Measure("seconds", "seconds", ".1f"),
+    Measure("processor seconds", "cpu_seconds", ".1f"),
+    Measure("peak memory (MB)", "memory_mb", ",.0f"),
+    Measure("COLMAP: photos placed (%)", "colmap_placed", "share"),
+    Measure("COLMAP: places, mean (% of the walk)", "colmap_places", "share"),
+    Measure("... ours, of the same photos", "colmap_ours_places", "share"),
+    Measure("COLMAP: rotation, mean (degrees)", "colmap_rotation", ".2f"),
+    Measure("... ours, of the same photos", "colmap_ours_rotation", ".2f"),
+    Measure("COLMAP: focal length off by (%)", "colmap_focal", "share"),
+    Measure("COLMAP: seconds", "colmap_seconds", ".1f"),
+    Measure("length of the walk (m)", "length", ".1f"),
+)
 
 
 def run_walks(
@@ -77,22 +127,15 @@ def run_walks(
     Raises:
         InputError: there is no walk. WeightsError: the checkpoint does not fit.
     """
-    done = 0
-
-    def judged(walk: Walk) -> Tally:
-        def told(stage: str, fraction: float) -> None:
-            progress(f"{walk.name}: {stage}", (done + fraction) / max(count, 1))
-
-        return Tally(judge(walk, bench, told, shown))
-
-    rows = []
-    for _, tally in collected(((walk.name, walk) for walk in walks), judged, shelf):
-        rows.append(tally.row)
-        done += 1
-    if not rows:
-        raise InputError("there is nothing to judge; give furniture or a folder with --posed")
-    made_with = str(bench.weights) if bench.weights else bench.preset
-    return {"weights": made_with, **summary(rows)}
+    tallies = judged(
+        ((walk.name, walk) for walk in walks),
+        lambda walk, told: Rows([judge(walk, bench, told, shown)]),
+        count=count,
+        shelf=shelf,
+        progress=progress,
+    )
+    rows = [row for tally in tallies.values() for row in tally.rows]
+    return {"weights": bench.made_with, "by_photos": by_photos(rows), "cases": rows}
 
 
 def judge(
@@ -130,7 +173,7 @@ def judge(
         done += photos
     for frame in pictured:
         target = walk.kept(frame)
-        shown(walk.name, frame, TRUTH, _rgb(as_seen(target, size_of(target, made.scene.view_size))))
+        shown(walk.name, frame, TRUTH, picture_of(as_seen(target, size_of(target, made.scene.view_size))))
     return {"name": walk.name, "photos": rows}
 
 
@@ -194,7 +237,7 @@ def _own_psnr(made: Made, view: int, render: Render) -> float:
     size = size_of(made.placed[view], scene.view_size)
     frame = render(scene, scene.camera(view, *size))
     shown = fill_gaps(frame.rgb.cpu().float(), frame.alphas.cpu().float()).clamp(0, 1)
-    return psnr(shown, _rgb(as_seen(made.placed[view], size)))
+    return psnr(shown, picture_of(as_seen(made.placed[view], size)))
 
 
 def _colmap(made: Made, bench: Bench) -> dict[str, float]:
@@ -232,7 +275,7 @@ def pictured_at(made: Made, walk: Walk, frame: int, bench: Bench) -> tuple[Tenso
     places = [torch.from_numpy(made.fit.viewmat(walk.camera(frame))).float()]
     if bench.align:
         places.append(_fitted_place(made, walk, frame, small, bench))
-    rgb, numbers = _rgb(large), {}
+    rgb, numbers = picture_of(large), {}
     for name, photo in (("", small), ("large_", large)):
         cameras = [Camera(place, photo.K, photo.rgb.shape[2], photo.rgb.shape[1]) for place in places]
         drawn = [_alike(scene, camera, photo, made.fit, bench) for camera in cameras]
@@ -246,15 +289,11 @@ def pictured_at(made: Made, walk: Walk, frame: int, bench: Bench) -> tuple[Tenso
 def _fitted_place(made: Made, walk: Walk, frame: int, photo: FittedPhoto, bench: Bench) -> Tensor:
     """The pose that fits the photo, sought from its place or from where its neighbours alone say that it was,
     whichever looks more like it."""
-    scene, truth = made.scene, _rgb(photo)
+    scene, truth = made.scene, picture_of(photo)
     starts = [fit.viewmat(walk.camera(frame)) for fit in (made.fit, made.fit_near(frame))]
     cameras = [Camera(torch.from_numpy(start).float(), photo.K, *scene.view_size) for start in starts]
     best = max(cameras, key=lambda at: psnr(bench.render(scene, at).rgb.cpu().float(), truth))
     return aligned_camera(lambda at: bench.render(scene, at), best, truth).viewmat
-
-
-def _rgb(photo: FittedPhoto) -> Tensor:
-    return photo.rgb.permute(1, 2, 0).float() / 255
 
 
 def _alike(
@@ -262,7 +301,11 @@ def _alike(
 ) -> tuple[Tensor, dict[str, float]]:
     """A drawn picture, and how near it is: whole, where the scene covers it, there in the photo's light."""
     frame = bench.render(scene, camera)
-    rgb, truth, shown = frame.rgb.cpu().float(), _rgb(photo), frame.alphas.cpu() >= ANSWERING.covered_alpha
+    rgb, truth, shown = (
+        frame.rgb.cpu().float(),
+        picture_of(photo),
+        frame.alphas.cpu() >= ANSWERING.covered_alpha,
+    )
     numbers = {"psnr": psnr(rgb, truth), "covered": float(shown.float().mean())}
     if bool(shown.any()):
         numbers["psnr_covered"] = psnr(rgb[shown], truth[shown])
@@ -274,15 +317,15 @@ def _alike(
     return rgb, numbers
 
 
-def summary(rows: Sequence[Mapping]) -> dict:
+def by_photos(rows: Sequence[Mapping]) -> dict[str, dict]:
     """Means over walks by number of photos; frames' within their walk first, so that each counts alike."""
-    by_photos: dict[str, dict] = {}
+    found: dict[str, dict] = {}
     for photos in sorted({int(name) for row in rows for name in row["photos"]}):
         means = [flat(row["photos"], str(photos)) for row in rows if str(photos) in row["photos"]]
-        keys = dict.fromkeys(key for found in means for key in found)
-        mean = {key: nan_mean(found.get(key, math.nan) for found in means) for key in keys}
-        by_photos[str(photos)] = {"walks": len(means), **rounded(mean)}
-    return {"by_photos": by_photos, "cases": list(rows)}
+        keys = dict.fromkeys(key for one in means for key in one)
+        mean = {key: nan_mean(one.get(key, math.nan) for one in means) for key in keys}
+        found[str(photos)] = {"walks": len(means), **rounded(mean)}
+    return found
 
 
 def flat(photos: Mapping[str, Mapping], name: str) -> dict[str, float]:
@@ -300,3 +343,23 @@ def flat(photos: Mapping[str, Mapping], name: str) -> dict[str, float]:
             changes = (number(frames[f].get(key)) - number(before[f].get(key)) for f in frames if f in before)
             found[f"gain_{key}"] = nan_mean(changes)
     return found
+
+
+def tables(result: Mapping) -> list[Table]:
+    """A row a measure, a column a number of photos."""
+    columns = {f"{photos} photos": row for photos, row in result["by_photos"].items()}
+    count = next(iter(columns.values()))["walks"]
+    return [by_measure("", f"mean of {count} walk{'s' * (count != 1)}", columns, MEASURES)]
+
+
+def changes(pairs: Sequence[tuple[Mapping, Mapping]]) -> Iterator[tuple[Measure, Pairs]]:
+    """What became of the same walks in another version, by number of photos."""
+    for photos in sorted({int(name) for old, _ in pairs for name in old["photos"]}):
+        known = [
+            (flat(old["photos"], str(photos)), flat(new["photos"], str(photos)))
+            for old, new in pairs
+            if str(photos) in old["photos"] and str(photos) in new["photos"]
+        ]
+        for measure in full_titles(MEASURES):
+            values = [(old.get(measure.key, math.nan), new.get(measure.key, math.nan)) for old, new in known]
+            yield Measure(f"{photos} photos: {measure.title}", measure.key, measure.form), values

@@ -6,7 +6,7 @@ import time
 from collections.abc import Sequence
 from concurrent.futures import ProcessPoolExecutor
 from concurrent.futures.process import BrokenProcessPool
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import cached_property
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -16,43 +16,30 @@ import numpy as np
 import torch
 from jaxtyping import Float
 
-from langflash_core.lab.evaluation.labelled import Render
-from langflash_core.lab.evaluation.lpips import Lpips
-from langflash_core.lab.evaluation.posed import as_seen, files_of, pose_of
-from langflash_core.lab.evaluation.side_measures import Similarity, as_array
+from langflash_core.lab.evaluation import bench as benches
+from langflash_core.lab.evaluation.bench import Render, as_array, as_seen, files_of, pose_of, wordless
+from langflash_core.lab.evaluation.side_measures import Similarity
 from langflash_core.lab.evaluation.sides import covered_depths
 from langflash_core.lab.evaluation.walk_measures import centres_of, fitted_cameras, lens_ratio, walked
 from langflash_core.lab.evaluation.walk_subjects import Walk
 from langflash_core.lab.photos import LabelledPhoto
 from langflash_core.lab.photos.fitting import FittedPhoto
 from langflash_core.lab.photos.folder import lenses_of
-from langflash_core.pipeline import reconstruct
 from langflash_core.reconstruction.networks import Networks
 from langflash_core.scene.file import load, save
-from langflash_core.types import NO_LANGUAGE, Record, Scene, Semantics
+from langflash_core.types import Scene
 
 
 @dataclass(frozen=True)
-class Bench:
-    """What scenes are made and judged with.
+class Bench(benches.Bench):
+    """assume_lens: `reconstruct` is told nothing of the lens. alone: kept frames' own two photos stand
+    beside. memory: each scene is made in a process of its own, whose memory is told. colmap: its cameras
+    stand beside."""
 
-    render: draws one. weights, preset, size: as `reconstruct` has them. assume_lens: it is told nothing of
-    the lens. alone: kept frames' own two photos stand
-    beside. align: also from poses fitted to the pictures. lpips: None leaves it out. memory: each scene is
-    made in a process of its own, whose memory is told. colmap: its cameras stand beside.
-    """
-
-    render: Render
-    weights: Path | None = None
-    preset: str = "mini"
-    size: int | None = None
     assume_lens: bool = False
     alone: bool = True
-    align: bool = False
-    lpips: Lpips | None = None
     memory: bool = False
     colmap: bool = False
-    networks: Networks = field(default_factory=Networks, repr=False, compare=False)
 
 
 @dataclass(frozen=True)
@@ -111,17 +98,9 @@ def made_of(walk: Walk, frames: Sequence[int], bench: Bench, *, memory: bool = F
     """
     photos = tuple(walk.photo(frame) for frame in frames)
     truth = true_cameras(photos)
-    options = {
-        "preset": bench.preset,
-        "weights": bench.weights,
-        "intrinsics": None if bench.assume_lens else lenses_of(photos),
-        "size": bench.size,
-    }
+    options = {**bench.options, "intrinsics": None if bench.assume_lens else lenses_of(photos)}
     with files_of(photos) as paths:
-        if memory:
-            scene, cost = _made_apart(paths, options)
-        else:
-            scene, cost = _made(paths, {**options, "networks": bench.networks})
+        scene, cost = _made_apart(paths, options) if memory else _made(paths, options, bench.networks)
     placed = placed_views(scene)
     views = tuple(view for view, photo in enumerate(photos) if photo.id in placed)
     fit = fitted_cameras(np.stack([as_array(placed[photos[v].id]) for v in views]), truth[list(views)])
@@ -135,9 +114,11 @@ def with_lens(lens: float, photo: FittedPhoto) -> FittedPhoto:
     return replace(photo, K=photo.K * torch.tensor([[lens, 1, 1], [1, lens, 1], [1, 1, 1]]).to(photo.K))
 
 
-def _made(paths: Sequence[Path], options: dict[str, Any]) -> tuple[Scene, Cost]:
+def _made(
+    paths: Sequence[Path], options: dict[str, Any], networks: Networks | None = None
+) -> tuple[Scene, Cost]:
     start, cpu = time.perf_counter(), time.process_time()
-    scene = reconstruct(paths, **options)
+    scene = benches.reconstruct(paths, networks=networks, **options)
     return scene, Cost(time.perf_counter() - start, time.process_time() - cpu)
 
 
@@ -170,15 +151,6 @@ def placed_views(scene: Scene) -> dict[str, torch.Tensor]:
 def true_cameras(photos: Sequence[LabelledPhoto]) -> Float[np.ndarray, "V 4 4"]:
     """World to camera."""
     return np.stack([np.linalg.inv(as_array(pose_of(photo))) for photo in photos])
-
-
-def wordless(scene: Scene) -> Scene:
-    """The scene without language, which costs memory and time to draw; of its record what it is drawn by."""
-    count = len(scene.gaussians)
-    ids = torch.zeros(count, 0, dtype=torch.int64)
-    nothing = Semantics(ids, torch.zeros(count, 0), torch.zeros(0, 0), NO_LANGUAGE)
-    told = Record(light=scene.record.light, layered=scene.record.layered)
-    return replace(scene, semantics=nothing, record=told)
 
 
 def _scaled(made: Made, render: Render) -> Similarity:

@@ -28,11 +28,11 @@ from langflash_core.geometry.cameras import invert_rigid
 from langflash_core.lab.evaluation.walk_passers import Screen, screen_in, with_somebody
 from langflash_core.lab.evaluation.walk_rooms import Way, found_way
 from langflash_core.lab.photos import LabelledPhoto, PhotoFolder
-from langflash_core.lab.rooms import Pack, RoomRenderer, StagedRoom, staged_room
+from langflash_core.lab.rooms import Pack, RoomRenderer, StagedRoom
 from langflash_core.lab.rooms.layout import Room
 from langflash_core.lab.rooms.render import Picture
 from langflash_core.lab.rooms.sensor import expose
-from langflash_core.lab.training.commands import cache_plan
+from langflash_core.lab.training.commands import set_rooms
 from langflash_core.surface.settings import LAYERS
 
 PHOTOS = (2, 4, 8, 16, 32)
@@ -172,20 +172,14 @@ def room_walks(
     Args:
         count: of walks.
     """
-    rooms = cache_plan(kind, 10**6)
     found = 0
-    for shard in rooms.shards():
-        width, height = shard.size
-        for seed in range(shard.first_seed, shard.first_seed + shard.count):
-            if found == count:
-                return
-            staged = staged_room(
-                seed, pack, renderer, num_views=shard.views, size=(height, width), libraries=rooms.libraries
-            )
-            path = found_way(staged, renderer, seed)
-            if path is not None:
-                found += 1
-                yield _room_walk(staged, renderer, path, plan, camcorder)
+    for staged in set_rooms(pack, renderer, kind, 10**6):
+        path = found_way(staged, renderer, staged.views.seed)
+        if path is not None:
+            found += 1
+            yield _room_walk(staged, renderer, path, plan, camcorder)
+        if found == count:
+            return
 
 
 def _room_walk(

@@ -8,21 +8,20 @@ from collections.abc import Callable, Iterable
 from pathlib import Path
 
 import numpy as np
-import torch
 
 from langflash_core.base.picture_files import opened_picture
 from langflash_core.errors import InputError
-from langflash_core.lab.photos.matlab import MatFile, open_mat
+from langflash_core.lab.photos.matlab import open_mat
 from langflash_core.lab.photos.partly import from_panoramas, from_plain, from_polygons, from_things
+from langflash_core.lab.photos.published import (
+    KINECT_CAMERA,
+    NYU_CAMERA,
+    NYU_FRAME,
+    forty_classes,
+    open_frames,
+)
 from langflash_core.lab.photos.reading import Source, read_json
 from langflash_core.lab.photos.writing import FolderWriter, NameTable
-
-NYU_FRAME = (41, 45, 601, 471)
-"""The usual crop of the 640 x 480 pictures, which have a white frame: left, top, right, bottom."""
-NYU_CAMERA = (518.8579, 519.4696, 325.5824, 253.7362)
-"""fx, fy, cx, cy of the colour camera, from the data set's toolbox."""
-KINECT_CAMERA = (585.0, 585.0, 320.0, 240.0)
-"""fx, fy, cx, cy that 7-Scenes publishes for its 640 x 480 frames."""
 
 
 def convert(layout: str, source: Source, out: Path) -> int:
@@ -64,17 +63,6 @@ def from_nyu(source: Source, writer: FolderWriter) -> None:
     labels = forty_classes(source.further.get("classes"), len(names))
     table = {i + 1: (name, label) for i, (name, label) in enumerate(zip(names, labels, strict=True))}
     writer.finish(table, "NYU Depth v2, Silberman et al. 2012", crop=list(NYU_FRAME))
-
-
-def forty_classes(path: Path | None, count: int) -> list[str | None]:
-    """Class of every name by classMapping40.mat; None of each without that file."""
-    if path is None:
-        return [None] * count
-    mat: MatFile = open_mat(path)
-    classes, rows = mat.texts("className"), mat.array("mapClass").ravel().astype(int).tolist()
-    if len(rows) != count:
-        raise InputError(f"{path} maps {len(rows)} names, the labels have {count}; use files of one release")
-    return [classes[row - 1] if row else None for row in rows]
 
 
 def from_coco(source: Source, writer: FolderWriter) -> None:
@@ -183,21 +171,14 @@ def from_frames(source: Source, writer: FolderWriter) -> None:
     if "camera" in source.further:
         values = _numbers(source.further["camera"], 9)
         camera = (values[0], values[4], values[2], values[5])
-    colours = [p for suffix in ("png", "jpg") for p in sorted(source.path.glob(f"frame-*.color.{suffix}"))]
-    for colour in source.walk(colours):
-        stem = colour.name.split(".")[0]
-        pose = np.array(_numbers(source.path / f"{stem}.pose.txt", 16)).reshape(4, 4)
-        if not np.isfinite(pose).all():
-            continue
-        id = stem.removeprefix("frame-")
-        writer.photo(id, colour)
-        depth = source.path / f"{stem}.depth.png"
-        if depth.is_file():
-            with opened_picture(depth) as opened:
-                steps = np.asarray(opened).astype(np.float64)
-            writer.depths(id, np.where(steps == 65535, 0, steps) / 1000)
+    folder = open_frames(source.path)
+    for id in source.walk(folder.ids):
+        writer.photo(id, folder.colour(id))
+        depths = folder.stored_depths(id)
+        if depths is not None:
+            writer.depths(id, depths[0])
         writer.camera(id, *camera)
-        writer.pose(id, torch.from_numpy(pose))
+        writer.pose(id, (folder.poses or {})[id])
     writer.finish({}, f"posed frames of {source.path.name}")
 
 

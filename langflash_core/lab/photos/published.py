@@ -18,24 +18,17 @@ from torch import Tensor
 from langflash_core.base.picture_files import opened_picture
 from langflash_core.errors import InputError
 from langflash_core.images.decode import read_photo
-from langflash_core.lab.photos.folder import (
-    MILLIMETRE,
-    Name,
-    PhotoFolder,
-    camera_matrix,
-    order,
-    read_map,
-)
-from langflash_core.lab.photos.layouts import (
-    KINECT_CAMERA,
-    NYU_CAMERA,
-    NYU_FRAME,
-    forty_classes,
-)
+from langflash_core.lab.photos.folder import MILLIMETRE, Name, PhotoFolder, camera_matrix, order, read_map
 from langflash_core.lab.photos.matlab import MatFile, open_mat
 from langflash_core.lab.photos.names import CLASSES40, class_of, spoken
 from langflash_core.lab.photos.reading import read_table
 
+NYU_FRAME = (41, 45, 601, 471)
+"""The usual crop of the 640 x 480 pictures, which have a white frame: left, top, right, bottom."""
+NYU_CAMERA = (518.8579, 519.4696, 325.5824, 253.7362)
+"""fx, fy, cx, cy of the colour camera, from the data set's toolbox."""
+KINECT_CAMERA = (585.0, 585.0, 320.0, 240.0)
+"""fx, fy, cx, cy that 7-Scenes publishes for its 640 x 480 frames."""
 SCANNET_NAMES = "scannetv2-labels.combined.tsv"
 NO_DEPTH = 65_535
 """What 7-Scenes writes where the sensor saw nothing."""
@@ -87,12 +80,27 @@ def open_nyu(path: Path, split: str | None = "testNdxs") -> NyuFile:
     return NyuFile(root=path, ids=ids, names=names, crop=NYU_FRAME, Ks=Ks, mat=mat)
 
 
+def forty_classes(path: Path | None, count: int) -> list[str | None]:
+    """Class of every name by classMapping40.mat; None of each without that file."""
+    if path is None:
+        return [None] * count
+    mat: MatFile = open_mat(path)
+    classes, rows = mat.texts("className"), mat.array("mapClass").ravel().astype(int).tolist()
+    if len(rows) != count:
+        raise InputError(f"{path} maps {len(rows)} names, the labels have {count}; use files of one release")
+    return [classes[row - 1] if row else None for row in rows]
+
+
 @dataclass(frozen=True)
 class FrameFolder(PhotoFolder):
     """frame-N.color.png, frame-N.depth.png (mm), frame-N.pose.txt, as 7-Scenes has them."""
 
+    def colour(self, id: str) -> Path:
+        """The photo's file."""
+        return _first(self.root, f"frame-{id}.color", (".png", ".jpg"))
+
     def stored_image(self, id: str) -> np.ndarray:
-        return _pixels(_first(self.root, f"frame-{id}.color", (".png", ".jpg")))
+        return _pixels(self.colour(id))
 
     def stored_depths(self, id: str) -> tuple[np.ndarray, bool] | None:
         path = self.root / f"frame-{id}.depth.png"
@@ -147,11 +155,7 @@ class ScanNetScene(PhotoFolder):
         return next((self.root / name for name in names if (self.root / name).is_dir()), self.root / names[0])
 
     def _sized(self, id: str, values: np.ndarray) -> np.ndarray:
-        with opened_picture(_first(self._folder("images", "color"), id, (".jpg", ".png"))) as photo:
-            size = photo.size
-        if (values.shape[1], values.shape[0]) == size:
-            return values
-        return np.asarray(Image.fromarray(values).resize(size, Image.Resampling.NEAREST))
+        return _resized(values, _size(_first(self._folder("images", "color"), id, (".jpg", ".png"))))
 
 
 def scannet_names(root: Path) -> dict[int, Name]:
@@ -219,16 +223,9 @@ class Re10kScene(PhotoFolder):
 
     def labels(self, id: str) -> np.ndarray:
         """Numbers (H, W) of the things in a frame, as it was labelled: at the frame's size."""
-        ids, image = (
-            _decoded_map(self.maps[id], f"labels of frame {id} of {self.root.name}"),
-            self.stored_image(id),
-        )
-        if ids.shape == image.shape[:2]:
-            return ids
-        size = (image.shape[1], image.shape[0])
-        return np.asarray(
-            Image.fromarray(ids.astype(np.int32)).resize(size, Image.Resampling.NEAREST)
-        ).astype(int)
+        ids = _decoded_map(self.maps[id], f"labels of frame {id} of {self.root.name}")
+        height, width = self.stored_image(id).shape[:2]
+        return _resized(ids.astype(np.int32), (width, height)).astype(np.int64)
 
     def stored_image(self, id: str) -> np.ndarray:
         return _decoded(self.frames[id], f"frame {id} of {self.root.name}")
@@ -313,8 +310,7 @@ class MaskedScene(PhotoFolder):
     def stored_labels(self, id: str) -> np.ndarray:
         """The class whose mask holds a pixel, the first in order of names; 0 where none does, and of photos
         without masks. Masks of another size take the photo's."""
-        with opened_picture(self.files[id]) as photo:
-            size = photo.size
+        size = _size(self.files[id])
         ids = np.zeros((size[1], size[0]), dtype=np.int64)
         if id not in self.annotated:
             return ids
@@ -361,12 +357,10 @@ def open_masked(root: Path) -> MaskedScene:
     names = {n: Name(text, class_of(text)) for n, text in enumerate(texts, start=1)}
     Ks = poses = None
     if (root / "cameras.pt").is_file():
-        with opened_picture(files[ids[0]]) as photo:
-            size = photo.size
         stored = _tensors(root / "cameras.pt")
         if not isinstance(stored, Tensor) or tuple(stored.shape) != (len(ids), RE10K_NUMBERS):
             raise InputError(f"{root / 'cameras.pt'} does not hold a camera per photo; get it again")
-        Ks, poses = _re10k_cameras(ids, stored, *size)
+        Ks, poses = _re10k_cameras(ids, stored, *_size(files[ids[0]]))
     return MaskedScene(
         root=root, ids=tuple(ids), names=names, Ks=Ks, poses=poses, files=files, annotated=annotated
     )
@@ -406,6 +400,19 @@ def _first(folder: Path, stem: str, suffixes: tuple[str, ...]) -> Path:
 
 def _pixels(path: Path) -> np.ndarray:
     return np.asarray(read_photo(path).image.convert("RGB"))
+
+
+def _size(path: Path) -> tuple[int, int]:
+    """(width, height) of a photo."""
+    with opened_picture(path) as photo:
+        return photo.size
+
+
+def _resized(values: np.ndarray, size: tuple[int, int]) -> np.ndarray:
+    """A map at (width, height), by nearest values."""
+    if (values.shape[1], values.shape[0]) == size:
+        return values
+    return np.asarray(Image.fromarray(values).resize(size, Image.Resampling.NEAREST))
 
 
 def _decoded(content: bytes, what: str) -> np.ndarray:

@@ -15,7 +15,7 @@ from langflash_core.lab.rooms.layout import Instance, Room, make_room
 from langflash_core.lab.rooms.pack import Pack, build_pack, load_pack
 from langflash_core.lab.rooms.preview import contact_sheet
 from langflash_core.lab.rooms.render import RoomRenderer
-from langflash_core.lab.rooms.sample import RoomViews, StagedRoom, render_room, staged_room
+from langflash_core.lab.rooms.sample import RoomViews, StagedRoom, staged_room
 
 __all__ = [
     "HELD_OUT_LIBRARIES",
@@ -34,6 +34,5 @@ __all__ = [
     "load_catalogue",
     "load_pack",
     "make_room",
-    "render_room",
     "staged_room",
 ]

@@ -12,7 +12,7 @@ from langflash_core.lab.rooms.catalogue import HELD_OUT_LIBRARIES, TRAIN_LIBRARI
 from langflash_core.lab.rooms.pack import build_pack, load_pack
 from langflash_core.lab.rooms.preview import contact_sheet
 from langflash_core.lab.rooms.render import RoomRenderer
-from langflash_core.lab.rooms.sample import RoomViews, render_room
+from langflash_core.lab.rooms.sample import RoomViews, staged_room
 
 
 def run_pack(root: Path, out: Path) -> int:
@@ -69,9 +69,9 @@ def run_render(
         for number in range(seed, seed + count):
             path = folder / f"room_{number:08d}.npz"
             if not path.exists():
-                views = render_room(
+                views = staged_room(
                     number, furniture, renderer, num_views=num_views, size=size, libraries=libraries
-                )
+                ).views
                 save_views(views, path)
             yield path
 

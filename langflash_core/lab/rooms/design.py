@@ -8,16 +8,7 @@ import numpy as np
 
 from langflash_core.lab.rooms.builtin import KIND_FABRIC, KIND_PLAIN
 from langflash_core.lab.rooms.objfile import Material
-from langflash_core.lab.rooms.solids import (
-    Triangles,
-    Vector,
-    box,
-    cylinder,
-    laid,
-    lathe,
-    rounded,
-    tube,
-)
+from langflash_core.lab.rooms.solids import Triangles, Vector, box, cylinder, laid, lathe, rounded, tube
 
 NUM_WOODS = 10
 

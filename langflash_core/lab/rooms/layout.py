@@ -213,7 +213,11 @@ def _wall_box(
 
 
 def _place(
-    site: _Site, index: int, position: np.ndarray, yaw: float, scale: tuple[float, float, float]
+    site: _Site,
+    index: int,
+    position: np.ndarray,
+    yaw: float,
+    scale: tuple[float, float, float] = (1.0, 1.0, 1.0),
 ) -> Instance:
     """An instance with its foot's centre at `position`, its front turned to `yaw`."""
     item, rng = site.pack.items[index], site.rng
@@ -371,9 +375,7 @@ def _hang(site: _Site, index: int, tries: int = 12) -> int | None:
         if item.size[0] > wall.length - 0.2:
             continue
         along = float(site.rng.uniform(item.size[0] / 2 + 0.05, wall.length - item.size[0] / 2 - 0.05))
-        placed = _place(
-            site, index, _on_wall(wall, along, item.size[2] / 2 + 0.002, foot), wall.yaw, (1.0, 1.0, 1.0)
-        )
+        placed = _place(site, index, _on_wall(wall, along, item.size[2] / 2 + 0.002, foot), wall.yaw)
         done = _commit(site, placed)
         if done is not None:
             return done
@@ -387,7 +389,7 @@ def _from_ceiling(site: _Site, index: int, tries: int = 6) -> int | None:
     for _ in range(tries):
         x, z = np.array(site.shell.size) * site.rng.uniform(0.35, 0.65, 2)
         foot = site.shell.height - item.size[1] - 0.001
-        done = _commit(site, _place(site, index, np.array([x, foot, z]), 0.0, (1.0, 1.0, 1.0)))
+        done = _commit(site, _place(site, index, np.array([x, foot, z]), 0.0))
         if done is not None:
             return done
     return None
@@ -408,9 +410,7 @@ def _counter(site: _Site, groups: tuple[str, ...], count: int) -> None:
                 break
             done = None
             if item.elevation < 0.3:
-                done = _commit(
-                    site, _place(site, index, _on_wall(wall, middle, out, 0.0), wall.yaw, (1.0, 1.0, 1.0))
-                )
+                done = _commit(site, _place(site, index, _on_wall(wall, middle, out, 0.0), wall.yaw))
             if done is not None:
                 _above(site, wall, middle, item)
                 count -= 1
@@ -430,9 +430,7 @@ def _above(site: _Site, wall: Wall, along: float, below: Item) -> None:
     if foot > below.size[1] + 0.25:
         _commit(
             site,
-            _place(
-                site, index, _on_wall(wall, along, item.size[2] / 2 + 0.002, foot), wall.yaw, (1.0, 1.0, 1.0)
-            ),
+            _place(site, index, _on_wall(wall, along, item.size[2] / 2 + 0.002, foot), wall.yaw),
         )
 
 
@@ -476,7 +474,7 @@ def _beside(site: _Site, main: Instance, index: int, group: str, side: tuple[flo
         shift[2] = -size[2] / 2 + item.size[2] / 2
     foot = (main.low + main.high) / 2
     foot[1] = 0.0
-    _commit(site, _place(site, index, foot + turn @ shift, yaw, (1.0, 1.0, 1.0)))
+    _commit(site, _place(site, index, foot + turn @ shift, yaw))
 
 
 def _fill_surfaces(site: _Site) -> None:
@@ -535,8 +533,5 @@ def _stand_on(site: _Site, anchor: int, index: int, tries: int = 10) -> None:
         if foot[1] > 1.75:
             continue
         yaw = math.atan2(base.model[0, 2], base.model[2, 2]) + turn
-        if (
-            _commit(site, _place(site, index, foot[:3], yaw, (1.0, 1.0, 1.0)), anchor, openings=False)
-            is not None
-        ):
+        if _commit(site, _place(site, index, foot[:3], yaw), anchor, openings=False) is not None:
             return

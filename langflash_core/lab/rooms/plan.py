@@ -8,6 +8,10 @@ from dataclasses import dataclass
 from langflash_core.lab.rooms.catalogue import Item
 
 
+def _words(text: str) -> tuple[str, ...]:
+    return tuple(text.split(", "))
+
+
 @dataclass(frozen=True)
 class Step:
     """One rule of a room.
@@ -39,21 +43,7 @@ ROOM_SHARES = (
 _HANGINGS = Step("hang", ("picture", "picture", "picture", "mirror", "clock", "wall lamp"), 1, 5)
 _CLUTTER = Step(
     "floor",
-    (
-        "plant",
-        "trash bin",
-        "bag",
-        "toy",
-        "box",
-        "basket",
-        "floor lamp",
-        "suitcase",
-        "cat",
-        "dog",
-        "plant",
-        "stool",
-        "speaker",
-    ),
+    _words("plant, trash bin, bag, toy, box, basket, floor lamp, suitcase, cat, dog, plant, stool, speaker"),
     1,
     5,
 )
@@ -90,15 +80,9 @@ ROOM_PLANS: dict[str, tuple[Step, ...]] = {
         _SOCKETS,
         Step(
             "floor",
-            (
-                "speaker",
-                "aquarium",
-                "musical instrument",
-                "firewood",
-                "person",
-                "christmas tree",
-                "game table",
-                "floor lamp",
+            _words(
+                "speaker, aquarium, musical instrument, firewood, person, christmas tree, game table, floor "
+                "lamp"
             ),
             0,
             2,
@@ -108,15 +92,9 @@ ROOM_PLANS: dict[str, tuple[Step, ...]] = {
     "kitchen": (
         Step(
             "counter",
-            (
-                "base cabinet",
-                "stove",
-                "dishwasher",
-                "refrigerator",
-                "sink unit",
-                "washing machine",
-                "base cabinet",
-                "sink unit",
+            _words(
+                "base cabinet, stove, dishwasher, refrigerator, sink unit, washing machine, base cabinet, "
+                "sink unit"
             ),
             5,
             10,
@@ -161,17 +139,7 @@ ROOM_PLANS: dict[str, tuple[Step, ...]] = {
         Step("wall", ("armchair", "chair", "table", "stool", "radiator", "ladder", "mannequin"), 1, 3),
         Step(
             "floor",
-            (
-                "bicycle",
-                "umbrella",
-                "bag",
-                "rug",
-                "mat",
-                "skateboard",
-                "stroller",
-                "fitness machine",
-                "wheelchair",
-            ),
+            _words("bicycle, umbrella, bag, rug, mat, skateboard, stroller, fitness machine, wheelchair"),
             1,
             3,
         ),
@@ -183,22 +151,9 @@ ROOM_PLANS: dict[str, tuple[Step, ...]] = {
 }
 
 _DECOR = ("plant", "vase", "lamp", "book", "book", "candle", "picture frame", "clock")
-_KITCHENWARE = (
-    "cup",
-    "bowl",
-    "bottle",
-    "food",
-    "coffee machine",
-    "kitchen appliance",
-    "toaster",
-    "microwave",
-    "kettle",
-    "teapot",
-    "pan",
-    "kitchen utensil",
-    "scale",
-    "plant",
-    "jar",
+_KITCHENWARE = _words(
+    "cup, bowl, bottle, food, coffee machine, kitchen appliance, toaster, microwave, kettle, teapot, pan, "
+    "kitchen utensil, scale, plant, jar"
 )
 
 # Supporting group -> (groups of small things, most of them at once).
@@ -208,34 +163,13 @@ ON_TOP: dict[str, tuple[tuple[str, ...], int]] = {
         6,
     ),
     "desk": (
-        (
-            "computer",
-            "computer",
-            "lamp",
-            "book",
-            "cup",
-            "stationery",
-            "keyboard",
-            "phone",
-            "printer",
-            "headphones",
-            "tablet",
+        _words(
+            "computer, computer, lamp, book, cup, stationery, keyboard, phone, printer, headphones, tablet"
         ),
         6,
     ),
     "coffee table": (
-        (
-            "book",
-            "cup",
-            "bowl",
-            "remote control",
-            "plant",
-            "candle",
-            "bottle",
-            "tray",
-            "glasses",
-            "game controller",
-        ),
+        _words("book, cup, bowl, remote control, plant, candle, bottle, tray, glasses, game controller"),
         4,
     ),
     "bedside table": (("lamp", "clock", "book", "phone", "cup", "glasses", "watch"), 2),

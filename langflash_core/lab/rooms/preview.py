@@ -10,7 +10,7 @@ from PIL import Image
 from langflash_core.lab.rooms.catalogue import TRAIN_LIBRARIES
 from langflash_core.lab.rooms.pack import Pack
 from langflash_core.lab.rooms.render import RoomRenderer
-from langflash_core.lab.rooms.sample import RoomViews, render_room
+from langflash_core.lab.rooms.sample import RoomViews, staged_room
 
 
 def contact_sheet(
@@ -21,7 +21,7 @@ def contact_sheet(
 ) -> Image.Image:
     """One column per view; rows are photo, depth (near bright) and instances, six views a band."""
     with RoomRenderer(pack) as renderer:
-        samples = [render_room(seed, pack, renderer, size=size, libraries=libraries) for seed in seeds]
+        samples = [staged_room(seed, pack, renderer, size=size, libraries=libraries).views for seed in seeds]
     bands = [_band(samples[k : k + 3]) for k in range(0, len(samples), 3)]
     width = max(band.shape[1] for band in bands)
     padded = [np.pad(band, ((0, 4), (0, width - band.shape[1]), (0, 0))) for band in bands]

@@ -88,19 +88,6 @@ class StagedRoom:
         return expose(picture.radiance, perfect, np.random.default_rng(0), self.grey), picture.depth
 
 
-def render_room(
-    seed: int,
-    pack: Pack,
-    renderer: RoomRenderer,
-    *,
-    num_views: int = 2,
-    size: tuple[int, int] = (224, 224),
-    libraries: tuple[str, ...] = TRAIN_LIBRARIES,
-) -> RoomViews:
-    """The photos of `staged_room`, which says what the arguments are."""
-    return staged_room(seed, pack, renderer, num_views=num_views, size=size, libraries=libraries).views
-
-
 def staged_room(
     seed: int,
     pack: Pack,

@@ -6,8 +6,9 @@ two runs write the same shards.
 """
 
 import logging
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -15,13 +16,7 @@ import torch
 from scipy.ndimage import distance_transform_edt
 from torch import Tensor
 
-from langflash_core.lab.rooms import (
-    TRAIN_LIBRARIES,
-    Pack,
-    RoomRenderer,
-    RoomViews,
-    render_room,
-)
+from langflash_core.lab.rooms import TRAIN_LIBRARIES, Pack, RoomRenderer, RoomViews, staged_room
 from langflash_core.lab.training.shards import NOTHING, Label, RoomRecord, quantise_tokens, write_shard
 from langflash_core.network.encoders.shared import Encoder
 from langflash_core.network.precision import mixed_precision
@@ -98,27 +93,44 @@ def fill_cache(
     Raises:
         ValueError: tokens are wanted but there is no encoder, or `part` is not i < n.
     """
-    if plan.with_tokens and encoder is None:
+
+    def drawn(shard: ShardPlan) -> Iterator[RoomRecord]:
+        for seed in range(shard.first_seed, shard.first_seed + shard.count):
+            record = render(seed, shard)
+            yield replace(record, rgb=photometric(record.rgb, record.seed)) if plan.augment else record
+
+    shards = ((folder / shard.name, partial(drawn, shard)) for shard in plan.shards())
+    return fill_shards(shards, encoder, part, with_tokens=plan.with_tokens)
+
+
+def fill_shards(
+    shards: Iterable[tuple[Path, Callable[[], Iterable[RoomRecord]]]],
+    encoder: Encoder | None,
+    part: tuple[int, int],
+    *,
+    with_tokens: bool,
+) -> int:
+    """Write those that are missing, each of records without tokens; what `fill_cache` says.
+
+    Raises:
+        ValueError: tokens are wanted but there is no encoder, or `part` is not i < n.
+    """
+    if with_tokens and encoder is None:
         raise ValueError("encoder: expected the frozen encoder, received None")
     if not 0 <= part[0] < part[1]:
         raise ValueError(f"part: expected (i, n) with 0 <= i < n, received {part}")
     written = 0
-    for shard in list(plan.shards())[part[0] :: part[1]]:
-        path = folder / shard.name
+    for path, drawn in list(shards)[part[0] :: part[1]]:
         if path.exists():
             continue
-        records = [_finished(render(shard.first_seed + i, shard), plan, encoder) for i in range(shard.count)]
+        records = [_encoded(record, encoder) if encoder and with_tokens else record for record in drawn()]
         write_shard(path, records)
         written += len(records)
         log.info("%s: %d scenes", path.name, len(records))
     return written
 
 
-def _finished(record: RoomRecord, plan: CachePlan, encoder: Encoder | None) -> RoomRecord:
-    if plan.augment:
-        record = replace(record, rgb=photometric(record.rgb, record.seed))
-    if encoder is None or not plan.with_tokens:
-        return record
+def _encoded(record: RoomRecord, encoder: Encoder) -> RoomRecord:
     steps, scales = quantise_tokens(encode_pictures(encoder, record.rgb))
     return replace(record, tokens=steps, token_scales=scales)
 
@@ -157,9 +169,9 @@ def rooms_renderer(pack: Pack, renderer: RoomRenderer, libraries: tuple[str, ...
 
     def render(seed: int, shard: ShardPlan) -> RoomRecord:
         width, height = shard.size
-        sample = render_room(
+        sample = staged_room(
             seed, pack, renderer, num_views=shard.views, size=(height, width), libraries=libraries
-        )
+        ).views
         return record_of(sample)
 
     return render

@@ -6,7 +6,7 @@ training does not import the query stage.
 
 import logging
 import time
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -16,7 +16,15 @@ from torch import Tensor
 from langflash_core.errors import InputError
 from langflash_core.lab.labels.ade import NAMES
 from langflash_core.lab.photos import PhotoFolder
-from langflash_core.lab.rooms import HELD_OUT_LIBRARIES, VALIDATION_LIBRARIES, RoomRenderer, load_pack
+from langflash_core.lab.rooms import (
+    HELD_OUT_LIBRARIES,
+    VALIDATION_LIBRARIES,
+    Pack,
+    RoomRenderer,
+    StagedRoom,
+    load_pack,
+    staged_room,
+)
 from langflash_core.lab.saving import save_whole
 from langflash_core.lab.training.batches import RoomSet
 from langflash_core.lab.training.cache import (
@@ -80,24 +88,31 @@ def cache_plan(kind: str, scenes: int, preset: str = "mini") -> CachePlan:
 def _cache_plan(kind: str, scenes: int) -> CachePlan:
     if kind == "train":
         return CachePlan(0, scenes)
+    judged = CachePlan(
+        VALIDATION_SEED, scenes, libraries=VALIDATION_LIBRARIES, augment=False, three_view_every=1
+    )
     if kind == "validation":
-        return CachePlan(
-            VALIDATION_SEED,
-            scenes,
-            libraries=VALIDATION_LIBRARIES,
-            augment=False,
-            three_view_every=1,
-        )
+        return judged
     if kind == "held_out":
-        return CachePlan(
-            HELD_OUT_SEED,
-            scenes,
-            libraries=HELD_OUT_LIBRARIES,
-            with_tokens=False,
-            augment=False,
-            three_view_every=1,
-        )
+        return replace(judged, first_seed=HELD_OUT_SEED, libraries=HELD_OUT_LIBRARIES, with_tokens=False)
     raise InputError(f"there is no set '{kind}'; choose one of {', '.join(SETS)}")
+
+
+def set_rooms(
+    pack: Pack, renderer: RoomRenderer, kind: str, count: int, *, times: int = 1
+) -> Iterator[StagedRoom]:
+    """Rooms of a set, made again from their seeds: the same photos, `times` as large.
+
+    Args:
+        kind: "held_out" or "validation".
+    """
+    plan = cache_plan(kind, count)
+    for shard in plan.shards():
+        size = (times * shard.size[1], times * shard.size[0])
+        for seed in range(shard.first_seed, shard.first_seed + shard.count):
+            yield staged_room(
+                seed, pack, renderer, num_views=shard.views, size=size, libraries=plan.libraries
+            )
 
 
 def run_cache(

@@ -40,6 +40,16 @@ def delta1(depths: Tensor, targets: Tensor, limit: float = 1.25) -> float:
     return float((torch.maximum(ratio, 1 / ratio) < limit).float().mean())
 
 
+def depth_measures(depths: Tensor, targets: Tensor) -> dict[str, float]:
+    """Of depths with their scale aligned, and of one flat wall instead."""
+    aligned = align_scale(depths, targets)
+    return {
+        "depth_abs_rel": abs_rel(aligned, targets),
+        "depth_delta1": delta1(aligned, targets),
+        "depth_abs_rel_flat": abs_rel(align_scale(torch.ones_like(targets), targets), targets),
+    }
+
+
 def confusion(predicted: Tensor, truth: Tensor, classes: int) -> Tensor:
     """Counts (classes, classes), rows truth, columns prediction; entries with truth < 0 are left out.
 

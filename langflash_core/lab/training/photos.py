@@ -9,6 +9,7 @@ import logging
 import time
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
@@ -18,9 +19,9 @@ from torch import Tensor
 
 from langflash_core.lab.photos import Name, PhotoFolder
 from langflash_core.lab.photos.fitting import FittedPhoto, drawn_window, fitted, network_size
-from langflash_core.lab.training.cache import encode_pictures, photometric
+from langflash_core.lab.training.cache import fill_shards, photometric
 from langflash_core.lab.training.photo_names import photo_label
-from langflash_core.lab.training.shards import NOTHING, Label, RoomRecord, quantise_tokens, write_shard
+from langflash_core.lab.training.shards import NOTHING, Label, RoomRecord
 from langflash_core.lab.training.stages.stage import guided
 from langflash_core.network.checkpoints.files import initial_network
 from langflash_core.network.encoders.shared import Encoder
@@ -62,19 +63,12 @@ def fill_photo_cache(
         ValueError: tokens are wanted but there is no encoder, or `part` is not i < n.
         InputError: a photo or its maps cannot be used. OutputError: `out` cannot be written.
     """
-    if plan.with_tokens and encoder is None:
-        raise ValueError("encoder: expected the frozen encoder, received None")
-    if not 0 <= part[0] < part[1]:
-        raise ValueError(f"part: expected (i, n) with 0 <= i < n, received {part}")
-    written = 0
-    for path, views in list(_shards(folder, out, plan))[part[0] :: part[1]]:
-        if path.exists():
-            continue
-        records = [photo_record(folder, id, copy, plan) for id, copy in views]
-        write_shard(path, [record if encoder is None else _encoded(record, encoder) for record in records])
-        written += len(records)
-        log.info("%s: %d views", path.name, len(records))
-    return written
+
+    def drawn(views: list[tuple[str, int]]) -> Iterator[RoomRecord]:
+        return (photo_record(folder, id, copy, plan) for id, copy in views)
+
+    shards = ((path, partial(drawn, views)) for path, views in _shards(folder, out, plan))
+    return fill_shards(shards, encoder, part, with_tokens=plan.with_tokens)
 
 
 def _shards(folder: PhotoFolder, out: Path, plan: PhotoPlan) -> Iterator[tuple[Path, list[tuple[str, int]]]]:
@@ -87,11 +81,6 @@ def _shards(folder: PhotoFolder, out: Path, plan: PhotoPlan) -> Iterator[tuple[P
         for start in range(0, len(views), PER_SHARD):
             name = f"{folder.root.name}_{width}x{height}_{start:06d}.safetensors"
             yield out / name, views[start : start + PER_SHARD]
-
-
-def _encoded(record: RoomRecord, encoder: Encoder) -> RoomRecord:
-    steps, scales = quantise_tokens(encode_pictures(encoder, record.rgb))
-    return replace(record, tokens=steps, token_scales=scales)
 
 
 def photo_record(folder: PhotoFolder, id: str, copy: int, plan: PhotoPlan) -> RoomRecord:

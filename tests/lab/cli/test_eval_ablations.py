@@ -46,8 +46,8 @@ def test_ablations_go_on_from_what_is_kept(cache, tmp_path, capsys, monkeypatch)
     assert first["scenes"] == 1 and first["labels"]["K4/lfa"]["groups_miou"] >= 0
     assert "bytes a Gaussian" in (tmp_path / "tables.md").read_text()
     judged = []
-    real = study.judge_room
-    monkeypatch.setattr(study, "judge_room", lambda *args: judged.append(args[2].seed) or real(*args))
+    real = study.judge
+    monkeypatch.setattr(study, "judge", lambda *args: judged.append(args[2].seed) or real(*args))
     monkeypatch.setattr(study, "gathered", None)  # what is fitted on is there
     assert main(words) == 0
     assert json.loads(capsys.readouterr().out)["scenes"] == 2 and judged == [1]

@@ -85,20 +85,8 @@ def test_the_shipped_network_goes_through_the_other_protocols(run, wall, tmp_pat
 
 
 def test_nyu_goes_on_from_what_it_kept_and_has_no_other_view(run, wall: PhotoFolder, tmp_path: Path):
-    words = (
-        "lab",
-        "eval",
-        "protocol",
-        "nyu",
-        wall.root,
-        "--size",
-        84,
-        "--backend",
-        "torch",
-        "--json",
-        "--limit",
-        1,
-    )
+    options = ["--size", "84", "--backend", "torch", "--json", "--limit", "1"]
+    words = ("lab", "eval", "protocol", "nyu", wall.root, *options)
     first = run(*words, "--work", tmp_path / "work")
     assert first.code == 0, first.err
     assert run(*words, "--work", tmp_path / "work").json() == first.json()  # seconds too

@@ -10,7 +10,6 @@ from PIL import Image
 from safetensors.torch import save_file
 
 from app.cli.lab.words.training import LAYOUTS
-from app.cli.parser import build_parser
 from langflash_core.lab.photos import layouts
 from langflash_core.lab.photos.writing import FolderWriter
 from langflash_core.lab.training.shards import Label, open_shards, write_shard
@@ -126,25 +125,12 @@ def test_train_needs_what_a_stage_reads(run, checkpoint, tmp_path):
 def test_train_export_of_nothing(run, checkpoint, tmp_path):
     (tmp_path / "run").mkdir()
     card = tmp_path / "card.json"
-    words = (
-        "lab",
-        "train",
-        "export",
-        tmp_path / "run",
-        "-o",
-        tmp_path / "w.safetensors",
-        "--start",
-        checkpoint,
-    )
+    words = ("lab", "train", "export", tmp_path / "run", "-o", tmp_path / "w.safetensors")
+    words = (*words, "--start", checkpoint)
     assert "no trained stage" in run(*words).err
     card.write_text("[]")
     assert "one JSON object" in run(*words, "--metadata", card).err
     assert not (tmp_path / "w.safetensors").exists()
-
-
-def test_part_and_defaults():
-    args = build_parser().parse_args(["lab", "train", "cache", "p.npz", "-o", "out", "--part", "1/2"])
-    assert args.part == (1, 2) and args.set == "train"
 
 
 @pytest.fixture
@@ -160,6 +146,20 @@ def photos(tmp_path):
     return tmp_path / "photos"
 
 
+def more(photos):
+    """Six photos of the two."""
+    for number in range(3, 7):
+        for folder in ("images", "labels"):
+            content = next((photos / folder).glob("1.*"))
+            (photos / folder / f"{number}{content.suffix}").write_bytes(content.read_bytes())
+
+
+def moved(before, after):
+    """The parts of a network that differ between two files."""
+    states = [load_network("mini", path).state_dict() for path in (before, after)]
+    return {key.split(".")[0] for key in states[0] if not torch.equal(*(state[key] for state in states))}
+
+
 def test_photos_are_cached(run, checkpoint, photos, tmp_path):
     words = ("--photos", photos, "-o", tmp_path / "cache", "--start", checkpoint, "--copies", "2")
     outcome = run("lab", "train", "cache", *words)
@@ -171,53 +171,25 @@ def test_photos_are_cached(run, checkpoint, photos, tmp_path):
 
 def test_the_late_half_is_trained_and_exported(run, checkpoint, photos, tmp_path):
     """Two steps on six photos and two rooms; what comes out is a network whose late halves have moved."""
-    for number in range(3, 7):
-        for folder in ("images", "labels"):
-            content = next((photos / folder).glob("1.*"))
-            (photos / folder / f"{number}{content.suffix}").write_bytes(content.read_bytes())
+    more(photos)
     rooms = [toy_record(seed) for seed in (0, 1)]
     write_shard(tmp_path / "cache" / "train" / "a.safetensors", rooms)
-    words = (
-        "--photos",
-        photos,
-        "--minutes",
-        "5",
-        "--max-steps",
-        "2",
-        "--pictures",
-        "3",
-        "--start",
-        checkpoint,
-    )
+    steps = ["--minutes", "5", "--max-steps", "2", "--pictures", "3", "--start"]
+    words = ("--photos", photos, *steps, checkpoint)
     outcome = run("lab", "train", "late", tmp_path / "cache", "-o", tmp_path / "run", *words)
     assert outcome.code == 0 and "2 steps" in outcome.out, outcome.err
     out = tmp_path / "w.safetensors"
     assert run("lab", "train", "export", tmp_path / "run", "-o", out, "--start", checkpoint).code == 0
-    before, after = (load_network("mini", path).state_dict() for path in (checkpoint, out))
-    moved = {key.split(".")[0] for key in before if not torch.equal(before[key], after[key])}
-    assert moved == {"late", "deep", "language_head", "decoder", "depth_head"}
+    assert moved(checkpoint, out) == {"late", "deep", "language_head", "decoder", "depth_head"}
 
 
 def test_the_late_half_goes_on_with_other_photos(run, checkpoint, photos, tmp_path):
     """The same photos once more without a label beside them; `late` is what later stages read."""
-    for number in range(3, 7):
-        for folder in ("images", "labels"):
-            content = next((photos / folder).glob("1.*"))
-            (photos / folder / f"{number}{content.suffix}").write_bytes(content.read_bytes())
+    more(photos)
     write_shard(tmp_path / "cache" / "train" / "a.safetensors", [toy_record(0)])
     assert run("lab", "train", "photos", "plain", photos / "images", "-o", tmp_path / "plain").code == 0
-    words = (
-        "--photos",
-        photos,
-        "--more",
-        tmp_path / "plain",
-        "--minutes",
-        "5",
-        "--max-steps",
-        "1",
-        "--pictures",
-        "2",
-    )
+    steps = ["--minutes", "5", "--max-steps", "1", "--pictures", "2"]
+    words = ("--photos", photos, "--more", tmp_path / "plain", *steps)
     where = ("-o", tmp_path / "run", "--start", checkpoint)
     outcome = run("lab", "train", "late", tmp_path / "cache", *words, *where)
     assert outcome.code == 0 and "1 steps" in outcome.out, outcome.err
@@ -231,25 +203,19 @@ def test_other_networks_are_learned_to_be_read(run, checkpoint, photos, tmp_path
     write_shard(tmp_path / "cache" / "train" / "a.safetensors", [toy_record(0)])
     few = ("--photos", photos, "-o", tmp_path / "few", "--minutes", "1", "--start", checkpoint)
     assert "no name that 5 of them show" in run("lab", "train", "second", tmp_path / "cache", *few).err
-    for number in range(3, 7):
-        for folder in ("images", "labels"):
-            content = next((photos / folder).glob("1.*"))
-            (photos / folder / f"{number}{content.suffix}").write_bytes(content.read_bytes())
+    more(photos)
     words = ("--photos", photos, "-o", tmp_path / "run", "--minutes", "5", "--max-steps", "2")
     outcome = run("lab", "train", "second", tmp_path / "cache", *words, "--start", checkpoint)
     assert outcome.code == 0 and "2 steps" in outcome.out, outcome.err
     out = tmp_path / "w.safetensors"
     assert run("lab", "train", "export", tmp_path / "run", "-o", out, "--start", checkpoint).code == 0
-    before, after = (load_network("mini", path).state_dict() for path in (checkpoint, out))
-    moved = {key.split(".")[0] for key in before if not torch.equal(before[key], after[key])}
-    assert moved == {"second_head"}
+    assert moved(checkpoint, out) == {"second_head"}
     blind = GuidedDepthNet(MINI)
     for value in blind.others.parameters():
         torch.nn.init.zeros_(value)
     save_network(blind, tmp_path / "blind.safetensors")
-    refused = run(
-        "lab", "train", "second", tmp_path / "cache", *words, "--start", tmp_path / "blind.safetensors"
-    )
+    words = ("lab", "train", "second", tmp_path / "cache", *words)
+    refused = run(*words, "--start", tmp_path / "blind.safetensors")
     assert refused.code == 2 and "holds no other networks; give both with --weights" in refused.err
 
 
@@ -270,11 +236,10 @@ def test_the_grouping_learns_from_named_and_outlined_photos(run, checkpoint, pho
     assert outcome.code == 0 and "trained grouping" in outcome.out, outcome.err
     (row,) = [json.loads(line) for line in (tmp_path / "run" / "grouping.jsonl").read_text().splitlines()][:1]
     assert "photos_contrast" in row and row["rate"] <= 1e-4
-    outcome = run("lab", "eval", "grouping", photos, "--weights", checkpoint, "--limit", "1", "--json")
+    words = ("lab", "eval", "grouping", photos, "--weights", checkpoint)
+    outcome = run(*words, "--limit", "1", "--json")
     assert outcome.code == 0 and 0 < outcome.json()["parts"]["achievable"] <= 1, outcome.err
-    assert (
-        "| F1 of borders, 4 pixels |" in run("lab", "eval", "grouping", photos, "--weights", checkpoint).out
-    )
+    assert "| F1 of borders, 4 pixels |" in run(*words).out
 
 
 def test_a_data_set_is_converted(run, tmp_path):
@@ -330,7 +295,7 @@ def test_posed_photos_are_judged_from_aside(run, checkpoint, tmp_path):
     table = tmp_path / "new" / "table.md"
     beside = run("lab", "eval", "beside", tmp_path / "now", tmp_path / "now", "-o", table)
     assert beside.code == 0 and beside.out == table.read_text()
-    assert "| between the photos: PSNR, holes black (dB) |" in beside.out and "+0.000 ± 0.000" in beside.out
+    assert "| between the photos: PSNR, holes black (dB) |" in beside.out and "+0.000 |" in beside.out
     without = run("lab", "eval", "beside", tmp_path / "now", tmp_path / "now", "--sheet", tmp_path / "a.png")
     assert without.code == 2 and "keeps no pictures" in without.err
     for depths in (posed / "depths").iterdir():
@@ -341,20 +306,8 @@ def test_posed_photos_are_judged_from_aside(run, checkpoint, tmp_path):
 def test_a_walk_is_judged_kept_and_judged_beside_itself(run, checkpoint, tmp_path):
     posed = write_folder(tmp_path / "posed", 5).root
     sheet, kept = tmp_path / "new" / "sheet.png", tmp_path / "kept"
-    words = (
-        "--weights",
-        checkpoint,
-        "--size",
-        "56",
-        "--photos",
-        "2",
-        "3",
-        "--kept",
-        "1",
-        "--limit",
-        "1",
-    )
-    words = ("lab", "eval", "walk", "--posed", posed, *words, "--results", kept)
+    words = ["--size", "56", "--photos", "2", "3", "--kept", "1", "--limit", "1", "--results"]
+    words = ("lab", "eval", "walk", "--posed", posed, "--weights", checkpoint, *words, kept)
     outcome = run(*words, "--sheet", sheet, "--json")
     assert outcome.code == 0, outcome.err
     document = outcome.json()
@@ -362,12 +315,8 @@ def test_a_walk_is_judged_kept_and_judged_beside_itself(run, checkpoint, tmp_pat
     (row,) = document["cases"]
     assert row["name"] == "001-005" and list(row["photos"]) == ["2", "3"]
     assert row["photos"]["3"]["gaussians"] > 0 and row["photos"]["3"]["frames"]["3"]["alone_psnr"] > 5
-    assert {path.stem.split("_")[-1] for path in (kept / "pictures").iterdir()} == {
-        "truth",
-        "2",
-        "3",
-        "own two",
-    }
+    pictures = {path.stem.split("_")[-1] for path in (kept / "pictures").iterdir()}
+    assert pictures == {"truth", "2", "3", "own two"}
     assert np.asarray(Image.open(sheet)).std() > 10
     # Gone on from: nothing is left to do, even without the photos.
     for photo in (posed / "images").iterdir():
@@ -376,7 +325,7 @@ def test_a_walk_is_judged_kept_and_judged_beside_itself(run, checkpoint, tmp_pat
     table, both = tmp_path / "new" / "table.md", tmp_path / "both.png"
     beside = run("lab", "eval", "beside", kept, kept, "-o", table, "--sheet", both)
     assert beside.code == 0 and beside.out == table.read_text()
-    assert "| 3 photos: PSNR between, whole (dB) |" in beside.out and "+0.00 ± 0.00" in beside.out
+    assert "| 3 photos: PSNR between, whole (dB) |" in beside.out and "+0.00 |" in beside.out
     assert np.asarray(Image.open(both)).shape[1] > np.asarray(Image.open(sheet)).shape[1]
 
 

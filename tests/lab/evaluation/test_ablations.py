@@ -10,7 +10,7 @@ from torch.nn import functional as F
 from langflash_core.lab.evaluation.ablations import study
 from langflash_core.lab.evaluation.ablations.groupings import point_groups, regrouped, true_names
 from langflash_core.lab.evaluation.ablations.tables import ablation_markdown, ablation_plots, summary
-from langflash_core.lab.evaluation.tallies import Shelf
+from langflash_core.lab.evaluation.tallies import Shelf, judged
 from langflash_core.lab.training.shards import Label, RoomRecord, write_shard
 from langflash_core.network import MINI, GuidedDepthNet, save_network
 from tests.lab.training.conftest import toy_record
@@ -103,8 +103,14 @@ def test_a_study_measures_every_rival_and_goes_on_from_its_fits(tmp_path: Path, 
     save_network(GuidedDepthNet(MINI), tmp_path / "mini.safetensors")
     shelf = Shelf(tmp_path / "work", {}, study.Tally)
     options = {"limit": 2, "most": 1, "shelf": shelf}
-    _, count, studies = study.room_studies(tmp_path, tmp_path / "mini.safetensors", **options)
-    ((_, tally),) = studies
+
+    def studied() -> tuple[int, study.Tally]:
+        setting, fits, count, cases = study.opened_study(tmp_path, tmp_path / "mini.safetensors", **options)
+        kept = study.grouped_shelf(shelf, setting)
+        (tally,) = judged(cases, lambda record, _: study.judge(setting, fits, record), shelf=kept).values()
+        return count, tally
+
+    count, tally = studied()
     assert count == 1 and (tmp_path / "work" / study.FITS).is_file()
     result = {"scenes": 1, "weights": "random", **summary(tally)}
     rows = set(result["labels"])
@@ -117,14 +123,13 @@ def test_a_study_measures_every_rival_and_goes_on_from_its_fits(tmp_path: Path, 
     text = ablation_markdown(result)
     assert "residual channels" in text and "0.7144, 0.8547" not in text  # K = 128 was not asked for
     assert all(plot.points for plot in ablation_plots(result, {}))
-    monkeypatch.setattr(study, "judge_room", lambda setting, fits, record: study.Tally())
-    ((_, second),) = study.room_studies(tmp_path, tmp_path / "mini.safetensors", **options)[2]
+    monkeypatch.setattr(study, "judge", lambda setting, fits, record: study.Tally())
+    second = studied()[1]
     for key, table in tally.counts.items():
         assert torch.equal(table, second.counts[key])
     lamps = [replace(record, labels=LAMPS) for record in held_out]
     write_shard(tmp_path / "held_out" / "a.safetensors", lamps)
-    ((_, third),) = study.room_studies(tmp_path, tmp_path / "mini.safetensors", **options)[2]
-    assert not third.counts  # other groups, other tables
+    assert not studied()[1].counts  # other groups, other tables
 
 
 def test_what_was_fitted_on_is_read_again_for_the_same_source_alone(tmp_path: Path):

@@ -15,8 +15,8 @@ from safetensors.torch import save_file
 from langflash_core.base.torchvision_fix import ensure_torchvision
 from langflash_core.lab.evaluation.lpips import Lpips
 from langflash_core.lab.evaluation.metrics import calibration_error
-from langflash_core.lab.evaluation.pictures import ssim
 from langflash_core.lab.evaluation.segments import panoptic
+from langflash_core.lab.evaluation.sharp_measures import ssim
 from langflash_core.lab.training.measures import (
     abs_rel,
     accuracy,

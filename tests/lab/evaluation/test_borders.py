@@ -9,7 +9,6 @@ from langflash_core.lab.evaluation.borders import (
     OTHER,
     UNKNOWN,
     border_f1,
-    borders,
     filled,
     right_near_borders,
 )
@@ -20,11 +19,6 @@ def halves(column: int, *, shape: tuple[int, int] = (40, 60)) -> np.ndarray:
     labels = np.zeros(shape, dtype=np.int64)
     labels[:, column:] = 1
     return labels
-
-
-def test_a_border_has_two_sides():
-    assert borders(halves(30)).sum() == 2 * 40 and borders(halves(30))[:, 29:31].all()
-    assert not borders(halves(0)).any()
 
 
 def test_borders_within_the_tolerance_are_right():

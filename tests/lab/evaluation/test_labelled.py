@@ -6,9 +6,10 @@ from pathlib import Path
 import pytest
 import torch
 
-from langflash_core.lab.evaluation import labelled
-from langflash_core.lab.evaluation.photo_tables import photos_markdown
+from langflash_core.lab.evaluation import bench, labelled
+from langflash_core.lab.evaluation.bench import Bench
 from langflash_core.lab.evaluation.photo_words import PhotoWords, absent_rows, paper_row, photos_of_names
+from langflash_core.lab.evaluation.tables import markdown
 from langflash_core.lab.evaluation.words import PAPER_LABELS
 from langflash_core.lab.photos import Name, PhotoFolder
 from langflash_core.language.spaces import language_space
@@ -31,7 +32,7 @@ def program(folder: PhotoFolder, monkeypatch):
         net.id = Path(paths[0]).stem
         return knowing([folder.photo(net.id)], folder.names)
 
-    monkeypatch.setattr(labelled, "reconstruct", reconstruct)
+    monkeypatch.setattr(bench, "reconstruct", reconstruct)
     monkeypatch.setattr(labelled, "load_network", lambda preset, weights: net)
     monkeypatch.setattr("langflash_core.lab.evaluation.photo_words.FINE_PHOTOS", 1)
     monkeypatch.setattr("langflash_core.lab.evaluation.photo_words.ASKED_PHOTOS", 1)
@@ -40,7 +41,7 @@ def program(folder: PhotoFolder, monkeypatch):
 
 
 def test_the_truth_scores_as_the_truth(folder: PhotoFolder, program):
-    result, tally = labelled.run_photos(folder, folder.ids[2:5], render)
+    result, tally = labelled.run_photos(folder, folder.ids[2:5], Bench(render))
     measures, atoms = result["measures"], result["labels"]["atoms"]
     assert result["photos"] == 3 and measures["covered"] > 0.98
     assert measures["depth_abs_rel"] < 1e-3 and measures["depth_delta1"] == 1
@@ -63,8 +64,8 @@ def test_the_truth_scores_as_the_truth(folder: PhotoFolder, program):
 
 
 def test_tables_say_what_the_result_says(folder: PhotoFolder, program):
-    result, _ = labelled.run_photos(folder, folder.ids[3:4], render)
-    table = photos_markdown(result)
+    result, _ = labelled.run_photos(folder, folder.ids[3:4], Bench(render))
+    table = markdown(labelled.tables(result))
     measures = result["measures"]
     flat = f"{measures['depth_abs_rel_flat']:.3f} (one depth)"
     assert f"| Depth AbsRel, scale aligned | {measures['depth_abs_rel']:.3f} | {flat} |" in table
@@ -74,7 +75,7 @@ def test_tables_say_what_the_result_says(folder: PhotoFolder, program):
 
 def test_pixels_without_a_scene_are_wrong(folder: PhotoFolder, program):
     """Half of the Gaussians vanish: the names there have no answer, and the depth there is not judged."""
-    judged = labelled.judged_by(folder, render)
+    judged = labelled.Judged.of(folder, Bench(render))
     photo = folder.photo("004")
     drawn, _ = labelled.draw_photo(judged, photo)
     half = drawn.maps.clone()
@@ -100,8 +101,8 @@ def test_a_wrong_name_costs_what_it_covers(folder: PhotoFolder, program, monkeyp
     def reconstruct(paths, **options):
         return knowing([folder.photo(Path(paths[0]).stem)], swapped)
 
-    monkeypatch.setattr(labelled, "reconstruct", reconstruct)
-    result, _ = labelled.run_photos(folder, ("002",), render)
+    monkeypatch.setattr(bench, "reconstruct", reconstruct)
+    result, _ = labelled.run_photos(folder, ("002",), Bench(render))
     ious = result["class_ious"]["atoms"]
     assert ious["wall"] > 0.9 and ious["chair"] < 0.05 and ious["desk"] < 0.05
     papers = result["paper_ious"]["atoms"]
@@ -112,18 +113,17 @@ def test_a_wrong_name_costs_what_it_covers(folder: PhotoFolder, program, monkeyp
 
 def test_depth_knows_no_unit_and_a_folder_needs_no_labels(folder: PhotoFolder, program, monkeypatch):
     monkeypatch.setattr(
-        labelled,
+        bench,
         "reconstruct",
         lambda paths, **options: knowing([folder.photo(Path(paths[0]).stem)], folder.names, scale=3.0),
     )
-    judged = labelled.judged_by(folder, render)
-    tally = labelled.Tally()
-    labelled.judge_photo(judged, replace(folder.photo("001"), labels=None, metric=False), tally)
+    judged = labelled.Judged.of(folder, Bench(render))
+    tally = labelled.judge(judged, replace(folder.photo("001"), labels=None, metric=False))
     assert tally.numbers["depth_abs_rel"][0] < 1e-3 and "depth_abs_rel_metric" not in tally.numbers
     assert not tally.counts and not tally.scores
     result = labelled.summary(tally, judged.words)
     assert result["labels"] == {} and "presence_recall" not in result["measures"]
-    assert "depth" in photos_markdown(result).lower()
+    assert "depth" in markdown(labelled.tables(result)).lower()
 
 
 def test_names_are_counted_by_photos_that_show_them(folder: PhotoFolder):

@@ -14,14 +14,15 @@ from langflash_core.lab.evaluation.level import (
     judge,
     judge_things,
     judge_world,
-    level_markdown,
     matched_things,
     seen_through,
     summary,
+    tables,
     true_instances,
     true_things,
     true_unit,
 )
+from langflash_core.lab.evaluation.tables import markdown
 from langflash_core.level import found_world
 from tests.lab.evaluation.true_scenes import UNIT, staged, true_scene
 
@@ -94,7 +95,7 @@ def test_a_summary_and_its_table_hold_every_number(judged):
     found = summary([judged, judged])
     assert found["rooms"] == 2 and found["walls_found"] == 2 * len(judged.walls)
     assert json.dumps(found, allow_nan=False)
-    table = level_markdown({"summary": found})
+    table = markdown(tables({"summary": found}))
     assert "Up within 1 degree" in table and "| Rooms | 2 |" in table
 
 

@@ -83,11 +83,6 @@ def test_the_area_under_the_curve_of_poses():
     assert all(math.isnan(area) for area in metrics.pose_auc([]))
 
 
-def test_the_worst_of_a_still_camera_is_its_rotation():
-    assert metrics.PoseError(3, math.nan).worst == 3
-    assert metrics.PoseError(3, 8).worst == 8
-
-
 def test_the_calibration_error_is_the_gap_between_scores_and_shares():
     scores, truths = torch.tensor([0.9, 0.9, 0.1, 0.1]), torch.tensor([True, False, False, False])
     assert metrics.calibration_error(scores, truths) == pytest.approx((0.4 + 0.1) / 2, abs=1e-6)

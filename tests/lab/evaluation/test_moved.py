@@ -5,7 +5,8 @@ import pytest
 
 from langflash_core.inventory import beside, inventory
 from langflash_core.inventory.alignment import Fit
-from langflash_core.lab.evaluation.moved import SEEN, WAY, judge_moved, moved_markdown, pushed_room
+from langflash_core.lab.evaluation.moved import SEEN, WAY, judge_moved, pushed_room, tables
+from langflash_core.lab.evaluation.tables import markdown
 from langflash_core.level import found_world
 from langflash_core.splat import render
 from tests.lab.evaluation.true_scenes import UNIT, staged, true_scene
@@ -51,5 +52,5 @@ def test_of_true_scenes_what_moved_is_found_and_of_one_scene_nothing(pushed, mon
 
 
 def test_the_table_tells_what_was_counted():
-    table = moved_markdown({"summary": {"rooms": 2.0, "moved": 6.0, "found": 5.0, "agree_mean": None}})
+    table = markdown(tables({"summary": {"rooms": 2.0, "moved": 6.0, "found": 5.0, "agree_mean": None}}))
     assert "| Things moved | 6 |" in table and "| ... said to have moved | 5 |" in table

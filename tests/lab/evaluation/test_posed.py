@@ -7,9 +7,10 @@ import pytest
 import torch
 
 from langflash_core.errors import InputError
-from langflash_core.lab.evaluation import posed
-from langflash_core.lab.evaluation.photo_tables import posed_markdown
-from langflash_core.lab.evaluation.posed import Triple, chosen_triples, run_posed
+from langflash_core.lab.evaluation import bench, posed
+from langflash_core.lab.evaluation.bench import Bench
+from langflash_core.lab.evaluation.posed import Triple, chosen_triples, run_posed, tables
+from langflash_core.lab.evaluation.tables import markdown
 from langflash_core.lab.photos import PhotoFolder
 from langflash_core.splat import render
 from tests.lab.evaluation.real_photos import knowing, write_folder
@@ -32,14 +33,14 @@ def program(folder: PhotoFolder, monkeypatch):
                 knowing([folder.photo(Path(path).stem) for path in paths], folder.names, scale=0.25)
             )
 
-        monkeypatch.setattr(posed, "reconstruct", reconstruct)
+        monkeypatch.setattr(bench, "reconstruct", reconstruct)
 
     return become
 
 
 def test_the_truth_scores_as_the_truth(folder: PhotoFolder, program):
     program()
-    result = run_posed(folder, TRIPLES, render)
+    result = run_posed(folder, TRIPLES, Bench(render))
     measures = result["measures"]
     assert result["pairs"] == 2 and measures["placed"] == 1 and measures["pose_right_share"] == 1
     assert measures["rotation_placed_median"] == measures["pose_rotation_median"]
@@ -48,7 +49,7 @@ def test_the_truth_scores_as_the_truth(folder: PhotoFolder, program):
     # 18 cm to the side move things by nine pixels of 112; the scene knows, the first photo does not.
     assert measures["psnr"] > measures["psnr_first_photo"] + 3 and measures["psnr"] > 20
     assert set(result["by_gap"]) == {"6", "12"} and result["by_gap"]["6"]["pairs"] == 1
-    table = posed_markdown(result)
+    table = markdown(tables(result))
     assert f"| {measures['depth_abs_rel']:.3f} |" in table and "| 12 | 1.000 | 1.000 |" in table
 
 
@@ -62,7 +63,7 @@ def test_a_turned_camera_is_told(folder: PhotoFolder, program):
         return replace(scene, viewmats=torch.stack((scene.viewmats[0], turn @ scene.viewmats[1])))
 
     program(turned)
-    measures = run_posed(folder, TRIPLES[:1], render)["measures"]
+    measures = run_posed(folder, TRIPLES[:1], Bench(render))["measures"]
     assert measures["pose_rotation_median"] == pytest.approx(10, abs=0.01)
     assert measures["pose_right_share"] == 0
 
@@ -72,7 +73,7 @@ def test_a_photo_without_a_place_counts_as_wrong(folder: PhotoFolder, program):
         return replace(scene, viewmats=scene.viewmats[:1], Ks=scene.Ks[:1])
 
     program(alone)
-    measures = run_posed(folder, TRIPLES[:1], render)["measures"]
+    measures = run_posed(folder, TRIPLES[:1], Bench(render))["measures"]
     assert measures["placed"] == 0 and measures["pose_right_share"] == 0
     assert measures["pose_direction_median"] == posed.LEFT_OUT
     assert "rotation_placed_median" not in measures
@@ -84,7 +85,7 @@ def test_without_depth_maps_the_cameras_tell_the_scale(tmp_path: Path, program):
     for path in (folder.root / "depths").iterdir():
         path.unlink()
     program()
-    measures = run_posed(folder, TRIPLES[:1], render)["measures"]
+    measures = run_posed(folder, TRIPLES[:1], Bench(render))["measures"]
     assert "depth_abs_rel" not in measures
     assert measures["psnr"] > measures["psnr_first_photo"] + 3
 
@@ -107,4 +108,4 @@ def test_a_photo_without_a_pose_is_named(folder: PhotoFolder, program):
     program()
     poses = {id: pose for id, pose in (folder.poses or {}).items() if id != "007"}
     with pytest.raises(InputError, match="photo 007 has no line"):
-        run_posed(replace(folder, poses=poses), TRIPLES[:1], render)
+        run_posed(replace(folder, poses=poses), TRIPLES[:1], Bench(render))

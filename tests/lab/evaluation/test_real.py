@@ -5,8 +5,7 @@ from pathlib import Path
 import pytest
 
 from langflash_core.errors import InputError
-from langflash_core.lab.evaluation.real import chosen_frames, summary
-from langflash_core.lab.evaluation.real_tables import real_markdown
+from langflash_core.lab.evaluation.real import chosen_frames, real_markdown, summary
 
 
 def _frames(count: int) -> list[Path]:

@@ -11,12 +11,14 @@ import numpy as np
 import pytest
 
 from langflash_core.base.colormaps import HEAT_STOPS
-from langflash_core.lab.evaluation import labelled, posed, report_page, sharp
+from langflash_core.lab.evaluation import bench, labelled, report_page
+from langflash_core.lab.evaluation.bench import Bench
 from langflash_core.lab.evaluation.drawing import drawn_frame
 from langflash_core.lab.evaluation.report import PUBLISHED, Sources, Workplace, plans
-from langflash_core.lab.evaluation.report_parts import Gallery, Plot, Point, Table
+from langflash_core.lab.evaluation.report_parts import Gallery, Plot, Point
 from langflash_core.lab.evaluation.report_plot import svg
 from langflash_core.lab.evaluation.sights import Sight, heat_picture, label_picture, legend_of
+from langflash_core.lab.evaluation.tables import Table
 from langflash_core.lab.photos import PhotoFolder
 from langflash_core.network import MINI
 from langflash_core.splat import render
@@ -42,8 +44,7 @@ def program(folder: PhotoFolder, monkeypatch) -> list[list[str]]:
         return knowing([folder.photo(id) for id in ids], folder.names, scale=0.25)
 
     monkeypatch.setitem(labelled.PRESETS, "mini", replace(MINI, native_area=56 * 42))
-    for module in (posed, labelled, sharp):
-        monkeypatch.setattr(module, "reconstruct", reconstruct)
+    monkeypatch.setattr(bench, "reconstruct", reconstruct)
     monkeypatch.setattr(labelled, "load_network", lambda preset, weights: network)
     return asked
 
@@ -55,7 +56,7 @@ def drawn(scene: Scene, camera: Camera) -> Frame:
 
 def made(folder: PhotoFolder, work: Path) -> list:
     ids = folder.ids[:2]
-    place = Workplace(drawn, work)
+    place = Workplace(Bench(drawn), work)
     return [judge(place) for judge in plans(Sources(None, None, folder, folder, ids, limit=2))]
 
 

@@ -7,21 +7,19 @@ from pathlib import Path
 import numpy as np
 import pytest
 import torch
-from PIL import Image
 
 from langflash_core.errors import InputError, SceneFileError
-from langflash_core.lab.evaluation import sharp
+from langflash_core.lab.evaluation import bench
 from langflash_core.lab.evaluation.drawing import drawn_frame
 from langflash_core.lab.evaluation.posed import Triple
-from langflash_core.lab.evaluation.sharp import PLAIN, Bench, judge, make_scene, run_sharp
+from langflash_core.lab.evaluation.sharp import PLAIN, Bench, judge, paired, run_sharp, tables
 from langflash_core.lab.evaluation.sharp_subjects import (
     pair_subjects,
-    picture_of,
     posed_subjects,
     room_subjects,
     sharp_size,
 )
-from langflash_core.lab.evaluation.sharp_tables import paired_difference, sharp_markdown
+from langflash_core.lab.evaluation.tables import difference, markdown
 from langflash_core.lab.photos import PhotoFolder
 from langflash_core.lab.rooms import RoomRenderer, load_pack
 from langflash_core.surface.settings import LAYERS
@@ -53,7 +51,7 @@ def program(folder: PhotoFolder, monkeypatch):
             return self.change(knowing([folder.photo(Path(p).stem) for p in paths], folder.names, scale=0.25))
 
     made = Program()
-    monkeypatch.setattr(sharp, "reconstruct", made)
+    monkeypatch.setattr(bench, "reconstruct", made)
     return made
 
 
@@ -70,9 +68,8 @@ def test_the_truth_is_near_its_photo_and_as_far_as_the_grid(folder, program):
     assert plain["photos"]["psnr"] > 20 and plain["between"]["psnr"] > 18
     assert plain["photos"]["psnr"] < grid["photos"]["psnr"] and plain["photos"]["detail"] < 1
     assert 0.5 < plain["between"]["seen"] <= 1 and plain["between_small"]["psnr"] > 18
-    assert (
-        plain["once"]["gaussians"] == 2 * 56 * 42 and plain["once"]["bytes"] > 30 * plain["once"]["gaussians"]
-    )
+    assert plain["once"]["gaussians"] == 2 * 56 * 42
+    assert plain["once"]["bytes"] > 30 * plain["once"]["gaussians"]
     assert "between_small" not in grid  # at the network's size the grid is the photo
 
 
@@ -112,13 +109,14 @@ def test_another_version_stands_beside(folder, program, tmp_path):
     )
     result = judged(folder, beside=tmp_path / "plain")
     assert list(result["measures"]) == ["grid", "plain", "other"]
-    change, error, count = paired_difference(result["cases"], "plain", "other", "photos", "psnr")
+    pairs = paired(result["cases"], "plain", "other", "photos", "psnr")
+    change, error, count = difference(pairs)
     found = [row["columns"] for row in result["cases"]]
     changes = [c["plain"]["photos"]["psnr"] - c["other"]["photos"]["psnr"] for c in found]
     assert count == 2 and change == pytest.approx(np.mean(changes)) and change < -1
     assert error == pytest.approx(np.std(changes, ddof=1) / math.sqrt(2))
     assert result["measures"]["other"]["once"]["seconds"] is None  # nobody knows how long it took
-    table = sharp_markdown(result)
+    table = markdown(tables(result))
     assert "| measure | photo through the grid | plain | other version |" in table
     assert f"PSNR (dB) | {result['measures']['grid']['photos']['psnr']:.2f} |" in table
     assert "| plain minus | photo through the grid | other version |" in table
@@ -133,18 +131,20 @@ def test_scenes_of_another_size_are_not_beside(folder, program, tmp_path):
         judged(folder, beside=tmp_path / "plain")
 
 
-def test_ways_that_are_not_there_are_refused():
+def test_ways_that_are_not_there_are_refused(folder):
+    subjects = posed_subjects(folder, TRIPLES)
     with pytest.raises(InputError, match="the detail 'finest' is unknown"):
-        make_scene([], "finest")
-    with pytest.raises(InputError, match="at least one pair"):
+        run_sharp(subjects, 1, Bench(render, ways=("finest",)))
+    with pytest.raises(InputError, match="nothing to judge"):
         run_sharp([], 0, Bench(render))
 
 
 def test_pictures_are_shown_with_the_photo_first(folder, program):
-    seen = {}
-    judge(next(iter(posed_subjects(folder, TRIPLES[:1]))), Bench(render), seen.__setitem__)
-    assert list(seen["001-007"]) == ["photo", "plain", "normal", "grid"]
-    assert {tuple(p.shape) for p in seen["001-007"].values()} == {(84, 112, 3)}
+    seen = []
+    judge(next(iter(posed_subjects(folder, TRIPLES[:1]))), Bench(render), seen.append)
+    (sight,) = seen
+    assert sight.name == "001-007" and list(sight.pictures) == ["photo", "plain", "normal", "grid"]
+    assert {p.shape for p in sight.pictures.values()} == {(28, 37, 3)}  # close-ups: a third of either side
 
 
 @pytest.mark.parametrize(
@@ -168,7 +168,6 @@ def test_pairs_of_files_and_folders(tmp_path):
     (named,) = pair_subjects([left, right])
     assert named == shipped[0] and named.between is None and named.intrinsics is None
     assert pair_subjects([right, left])[0].name == f"{right.stem}-{left.stem}"
-    assert picture_of(named.photo(1), (48, 32)).shape == (32, 48, 3)
     with named.files() as paths:
         assert paths == (left, right)
     cases: list[tuple[list[Path], str]] = [
@@ -179,14 +178,6 @@ def test_pairs_of_files_and_folders(tmp_path):
     for photos, hint in cases:
         with pytest.raises(InputError, match=hint):
             pair_subjects(photos)
-
-
-def test_pictures_of_a_folder_become_files(folder):
-    (subject,) = posed_subjects(folder, TRIPLES[:1])
-    with subject.files() as paths:
-        assert [path.stem for path in paths] == ["001", "007"]
-        assert (np.asarray(Image.open(paths[1])) == folder.photo("007").image).all()
-    assert not paths[0].exists()
 
 
 @pytest.mark.slow

@@ -23,7 +23,7 @@ from langflash_core.lab.evaluation.sharp_measures import (
     true_detail,
     window_side,
 )
-from langflash_core.lab.evaluation.sharp_pictures import busiest_corner, closeups
+from langflash_core.lab.evaluation.sights import busiest_corner, closeups
 from langflash_core.lab.training.measures import psnr
 from langflash_core.splat import render
 from tests.app.cli.conftest import stripes
@@ -66,19 +66,6 @@ def test_detail_of_a_wave_after_a_mean_of_nine(period: int):
     gain = (1 + 2 * math.cos(2 * math.pi / period)) / 3
     assert detail(blurred, photo[1:-1, 1:-1]) == pytest.approx(gain**2, abs=1e-5)
     assert true_detail(blurred, photo[1:-1, 1:-1]) == pytest.approx(gain, abs=1e-5)
-
-
-def test_detail_of_white_noise_after_a_mean_of_nine():
-    """Kernels: of a mean b and the rest d - b, white noise has |(d - b) * b|^2 / |d - b|^2 = .0586."""
-    box = torch.full((1, 1, 3, 3), 1 / 9)
-    rest = -box.clone()
-    rest[0, 0, 1, 1] += 1
-    both = F.conv2d(F.pad(rest, (2, 2, 2, 2)), box)
-    expected = float(both.square().sum() / rest.square().sum())
-    photo = noise(1, 300, 300)
-    blurred = F.avg_pool2d(photo.permute(2, 0, 1), 3, stride=1).permute(1, 2, 0)
-    # 90,000 pixels, neighbours alike: some 10,000 independent squares of relative deviation sqrt 2.
-    assert detail(blurred, photo[1:-1, 1:-1]) == pytest.approx(expected, rel=0.05)
 
 
 def test_noise_counts_as_detail_but_not_as_the_photos():

@@ -8,13 +8,20 @@ import torch
 
 from langflash_core.errors import InputError
 from langflash_core.geometry.cameras import invert_rigid
-from langflash_core.lab.evaluation import posed
+from langflash_core.lab.evaluation import bench
+from langflash_core.lab.evaluation.bench import Bench
 from langflash_core.lab.evaluation.posed import Triple
-from langflash_core.lab.evaluation.report_sides import Tally as Sides
-from langflash_core.lab.evaluation.report_sides import side_summary, side_tables
 from langflash_core.lab.evaluation.side_subjects import posed_cases
-from langflash_core.lab.evaluation.side_tables import beside_markdown, sides_markdown
-from langflash_core.lab.evaluation.sides import aligned, camera_of, covered_depths, judge, run_sides, summary
+from langflash_core.lab.evaluation.sides import (
+    aligned,
+    camera_of,
+    changes,
+    covered_depths,
+    judge_scene,
+    run_sides,
+    tables,
+)
+from langflash_core.lab.evaluation.tables import beside, markdown
 from langflash_core.lab.photos import PhotoFolder
 from langflash_core.splat import render
 from langflash_core.types import Scene
@@ -38,7 +45,7 @@ def scene(folder: PhotoFolder) -> Scene:
 
 def judged(scene: Scene, folder: PhotoFolder) -> dict:
     (case,) = posed_cases(folder, [TRIPLE])
-    return judge(scene, case.truth(SIZE), render)
+    return judge_scene(scene, case.truth(SIZE), Bench(render))
 
 
 def test_the_truth_scores_as_the_truth(folder: PhotoFolder, scene: Scene):
@@ -99,30 +106,19 @@ def test_a_photo_without_a_place_is_left_out(folder: PhotoFolder, scene: Scene):
 
 
 def test_two_runs_are_told_beside_each_other(folder: PhotoFolder, scene: Scene, monkeypatch):
-    monkeypatch.setattr(posed, "reconstruct", lambda paths, **options: scene)
-    before = run_sides(posed_cases(folder, [TRIPLE]), 1, render)
-    assert before["cases"][0]["name"] == "001-007" and before["measures"]["placed"] == 1
-    assert "| between the photos | 1 | " in sides_markdown(before)
+    monkeypatch.setattr(bench, "reconstruct", lambda paths, **options: scene)
+    triples = [TRIPLE, Triple("002", "005", "008", 6)]
+    before = run_sides(posed_cases(folder, triples), 2, Bench(render))
+    assert [row["name"] for row in before["cases"]] == ["001-007", "002-008"]
+    assert before["measures"]["placed"] == 1
+    table = markdown(tables(before))
+    assert "| between the photos | 2 | " in table and "| Second photo found its place | 1.000 |" in table
     after = json.loads(json.dumps(before))
     after["cases"][0]["looks"]["004"]["psnr"] += 1.5
-    table = beside_markdown(before, after)
-    assert "+1.500 ± 0.000" in next(line for line in table.splitlines() if "between the photos: PSNR" in line)
-    with pytest.raises(InputError, match="at least one room"):
-        run_sides([], 0, render)
-
-
-def test_a_report_tells_the_same_of_sides(folder: PhotoFolder, scene: Scene):
-    row = {"name": "pair", "seconds": 1.0, **judged(scene, folder)}
-    tally = Sides([row, row])
-    result = side_summary(tally)
-    assert set(result) == {"measures", "by_look"}  # rooms one by one would fill the report's numbers
-    once, looks = side_tables(result)
-    assert ("Second photo found its place", "1.000") in once.rows
-    assert looks.rows[0][0] == "the photos' own places" and looks.rows[0][1] == "2"
-    (kept,) = [shown for shown in sides_markdown(run_like(row)).splitlines() if shown.startswith("| between")]
-    assert [cell.strip() for cell in kept.split("|")[3:-1]] == list(looks.rows[-1][2:])
-
-
-def run_like(row: dict) -> dict:
-    """What `run_sides` gives of two such rows."""
-    return summary([row, row])
+    pairs = list(zip(before["cases"], after["cases"], strict=True))
+    table = markdown([beside("measure", changes(pairs))])
+    assert "+0.750 ± 0.750" in next(line for line in table.splitlines() if "between the photos: PSNR" in line)
+    alone = markdown([beside("measure", changes(pairs[:1]))])
+    assert "| +1.500 |" in alone  # of one case nobody knows an error
+    with pytest.raises(InputError, match="nothing to judge"):
+        run_sides([], 0, Bench(render))

@@ -7,15 +7,7 @@ import pytest
 import torch
 
 from langflash_core.lab.evaluation.metrics import PoseError, Presence
-from langflash_core.lab.evaluation.tallies import (
-    Shelf,
-    collected,
-    intervals,
-    merged,
-    numbers_of,
-    plain,
-    revived,
-)
+from langflash_core.lab.evaluation.tallies import Shelf, intervals, judged, merged, numbers_of, plain, revived
 
 
 @dataclass
@@ -65,17 +57,19 @@ def test_what_was_made_otherwise_or_is_damaged_is_made_again(tmp_path):
     shelf = Shelf(tmp_path, {"weights": "a"}, Made)
     asked = []
 
-    def judge(value: float) -> Made:
+    def judge(value: float, progress) -> Made:
+        progress("half", 0.5)
         asked.append(value)
         return made(value)
 
-    items = [("one", 1.0), ("two", 2.0)]
-    assert [name for name, _ in collected(items, judge, shelf)] == ["one", "two"]
-    list(collected(items, judge, shelf))
+    items, told = [("one", 1.0), ("two", 2.0)], []
+    found = judged(items, judge, count=2, shelf=shelf, progress=lambda *said: told.append(said))
+    assert list(found) == ["one", "two"] and told[-1] == ("two: half", 0.75)
+    judged(items, judge, shelf=shelf)
     assert asked == [1, 2]
-    list(collected(items, judge, Shelf(tmp_path, {"weights": "b"}, Made)))
+    judged(items, judge, shelf=Shelf(tmp_path, {"weights": "b"}, Made))
     (tmp_path / "one.json").write_text('{"key": {"weights": "b"}, "tally": {"of": "Other"}}')
-    list(collected(items, judge, Shelf(tmp_path, {"weights": "b"}, Made)))
+    judged(items, judge, shelf=Shelf(tmp_path, {"weights": "b"}, Made))
     assert asked == [1, 2, 1, 2, 1]
 
 

@@ -12,12 +12,22 @@ import pytest
 import torch
 
 from langflash_core.errors import InputError
-from langflash_core.lab.evaluation import walk_scenes
-from langflash_core.lab.evaluation.tallies import Shelf
-from langflash_core.lab.evaluation.walk import OWN, TRUTH, Tally, flat, judge, pictured_at, run_walks, summary
+from langflash_core.lab.evaluation import bench, walk_scenes
+from langflash_core.lab.evaluation.tables import beside, markdown
+from langflash_core.lab.evaluation.tallies import Rows, Shelf
+from langflash_core.lab.evaluation.walk import (
+    OWN,
+    TRUTH,
+    by_photos,
+    changes,
+    flat,
+    judge,
+    pictured_at,
+    run_walks,
+    tables,
+)
 from langflash_core.lab.evaluation.walk_scenes import Bench, made_of
 from langflash_core.lab.evaluation.walk_subjects import planned, posed_walks
-from langflash_core.lab.evaluation.walk_tables import beside_markdown, walk_markdown
 from langflash_core.lab.photos import PhotoFolder
 from langflash_core.splat import render
 from tests.lab.evaluation.real_photos import knowing, write_folder
@@ -89,7 +99,7 @@ def true_scenes(
             names = [names[k] for k in keep]
         return scene.with_record(photos=tuple(f"{name}.png" for name in names))
 
-    monkeypatch.setattr(walk_scenes, "reconstruct", reconstruct)
+    monkeypatch.setattr(bench, "reconstruct", reconstruct)
     return made
 
 
@@ -101,23 +111,13 @@ def test_the_truth_scores_as_the_truth(folder: PhotoFolder, monkeypatch):
     two, four = row["photos"]["2"], row["photos"]["4"]
     assert walk.name == "001-007" and list(two["frames"]) == list(four["frames"]) == ["1", "5"]
     for scene in (two, four):
-        assert (
-            scene["placed"] == 1
-            and scene["places"] < 1e-4
-            and scene["rotation"] < 1e-2
-            and scene["focal"] == 0
-        )
-        assert (
-            scene["depth_abs_rel"] < 1e-3
-            and scene["depth_delta1"] == 1
-            and scene["length"] == pytest.approx(0.36)
-        )
+        assert scene["placed"] == 1 and scene["places"] < 1e-4 and scene["rotation"] < 1e-2
+        assert scene["focal"] == 0
+        assert scene["depth_abs_rel"] < 1e-3 and scene["depth_delta1"] == 1
+        assert scene["length"] == pytest.approx(0.36)
         for numbers in scene["frames"].values():
-            assert (
-                numbers["psnr_covered"] > 20
-                and numbers["large_psnr_covered"] > 18
-                and numbers["depth"] < 1e-3
-            )
+            assert numbers["psnr_covered"] > 20 and numbers["large_psnr_covered"] > 18
+            assert numbers["depth"] < 1e-3
     assert four["gaussians"] == 2 * two["gaussians"]
     # Own photos are made once each, and those of a scene of two are that scene.
     assert sorted(map(tuple, made)) == sorted(
@@ -178,7 +178,7 @@ def test_a_single_photo_in_place_has_the_scale_of_its_depth(folder: PhotoFolder,
         scene = knowing([folder.photo(Path(paths[0]).stem)], folder.names, scale=0.25)
         return scene.with_record(photos=(str(paths[0]),))
 
-    monkeypatch.setattr(walk_scenes, "reconstruct", reconstruct)
+    monkeypatch.setattr(bench, "reconstruct", reconstruct)
     (walk,) = posed_walks(folder, planned((2,)), 1)
     row = judge(walk, BENCH)["photos"]["2"]
     assert row["placed"] == 0.5 and row["places"] is None and row["depth_abs_rel"] < 1e-3
@@ -193,7 +193,7 @@ def test_what_reconstruct_is_told(folder: PhotoFolder, monkeypatch):
         names = [Path(path).stem for path in paths]
         return knowing([folder.photo(name) for name in names], folder.names).with_record(photos=tuple(names))
 
-    monkeypatch.setattr(walk_scenes, "reconstruct", reconstruct)
+    monkeypatch.setattr(bench, "reconstruct", reconstruct)
     (walk,) = posed_walks(folder, planned((2,)), 1)
     judge(walk, BENCH)
     judge(walk, replace(BENCH, assume_lens=True))
@@ -203,23 +203,22 @@ def test_what_reconstruct_is_told(folder: PhotoFolder, monkeypatch):
 
 def test_walks_are_kept_and_told_beside_each_other(folder: PhotoFolder, monkeypatch, tmp_path):
     made = true_scenes(folder, monkeypatch)
-    shelf = Shelf(tmp_path, {"photos": 4}, Tally)
+    shelf = Shelf(tmp_path, {"photos": 4}, Rows)
     plan = planned((2, 3), 2)
     before = run_walks(posed_walks(folder, plan, 2), 2, BENCH, shelf=shelf)
     assert [row["name"] for row in before["cases"]] == ["001-005", "003-007"]
     count = len(made)
     assert run_walks(posed_walks(folder, plan, 2), 2, BENCH, shelf=shelf) == before and len(made) == count
     assert before["by_photos"]["3"]["walks"] == 2 and before["by_photos"]["3"]["placed"] == 1
-    table = walk_markdown(before)
-    assert (
-        "| mean of 2 walks | 2 photos | 3 photos |" in table
-        and "| photos placed (%) | 100.00 | 100.00 |" in table
-    )
+    table = markdown(tables(before))
+    assert "| mean of 2 walks | 2 photos | 3 photos |" in table
+    assert "| photos placed (%) | 100.00 | 100.00 |" in table
     after = json.loads(json.dumps(before))
     for row, change in zip(after["cases"], (1.0, 2.0), strict=True):
         for frame in row["photos"]["3"]["frames"].values():
             frame["psnr"] += change
-    lines = beside_markdown(before, after).splitlines()
+    pairs = list(zip(before["cases"], after["cases"], strict=True))
+    lines = markdown([beside("measure", changes(pairs))]).splitlines()
     assert "+1.50 ± 0.50" in next(
         line for line in lines if line.startswith("| 3 photos: PSNR between, whole (dB) |")
     )
@@ -238,7 +237,7 @@ def test_more_photos_are_set_against_fewer_at_the_frames_that_both_have():
     found = flat(photos, "4")
     assert found["between_psnr"] == 25.5 and found["gain_psnr"] == 1.0
     assert "gain_psnr" not in flat(photos, "2")
-    row = summary([{"name": "a", "photos": photos}])["by_photos"]["4"]
+    row = by_photos([{"name": "a", "photos": photos}])["4"]
     assert row["placed"] is None and row["gain_psnr"] == 1.0
 
 

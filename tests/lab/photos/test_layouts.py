@@ -231,5 +231,5 @@ def test_posed_frames(tmp_path: Path):
 def test_unknown_layouts_and_empty_folders(tmp_path: Path):
     with pytest.raises(InputError, match="there is no layout 'voc'"):
         convert("voc", Source(tmp_path), tmp_path / "out")
-    with pytest.raises(InputError, match="holds no photo in the layout 'frames'"):
-        convert("frames", Source(tmp_path), tmp_path / "out")
+    with pytest.raises(InputError, match="holds no photo in the layout 'plain'"):
+        convert("plain", Source(tmp_path), tmp_path / "out")

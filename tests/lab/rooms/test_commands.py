@@ -7,7 +7,6 @@ import pytest
 from PIL import Image
 
 from langflash_core.errors import InputError
-from langflash_core.lab.rooms import RoomRenderer
 from langflash_core.lab.rooms.commands import load_views, run_pack, run_preview, run_render
 from tests.lab.rooms.conftest import TINY_PACK
 
@@ -35,7 +34,3 @@ def test_preview_writes_a_sheet(tmp_path: Path) -> None:
 def test_pack_needs_libraries(tmp_path: Path) -> None:
     with pytest.raises(InputError, match="sh3f"):
         run_pack(tmp_path, tmp_path / "pack.npz")
-
-
-def test_renderer_is_a_context_manager() -> None:
-    assert hasattr(RoomRenderer, "__enter__")

@@ -1,13 +1,11 @@
 """Furniture by recipes: the same at every call, sound, of sizes that people use, for training only."""
 
-import io
 import zipfile
 from collections import defaultdict
 from pathlib import Path
 
 import numpy as np
 import pytest
-from PIL import Image
 
 from langflash_core.lab.rooms import (
     HELD_OUT_LIBRARIES,
@@ -22,7 +20,7 @@ from langflash_core.lab.rooms.catalogue import PARAMETRIC, UNSEEN, Item
 from langflash_core.lab.rooms.design import Draw, Look
 from langflash_core.lab.rooms.mesh import HEIGHT_CELLS, height_map, pose
 from langflash_core.lab.rooms.objfile import Soup
-from langflash_core.lab.rooms.pack import MAX_SOURCE_FACES, TEXTURE_SIZE
+from langflash_core.lab.rooms.pack import MAX_SOURCE_FACES
 from langflash_core.lab.rooms.parametric import PIECES, _finished, parametric_models, wood_textures
 from langflash_core.lab.rooms.plan import ODDS, ON_TOP, ROOM_PLANS, role
 from langflash_core.lab.rooms.recipes import drawn
@@ -163,16 +161,6 @@ def test_tables_are_at_the_height_of_elbows() -> None:
     for name, (low, high) in TABLE_HEIGHTS.items():
         for model in plain(name):
             assert low <= top_before_middle(model) <= high, model[0].key
-
-
-def test_wood_textures_decode() -> None:
-    textures = wood_textures()
-    assert textures == wood_textures()
-    assert len(set(textures.values())) == len(textures)
-    for encoded in textures.values():
-        picture = Image.open(io.BytesIO(encoded))
-        assert picture.size == (TEXTURE_SIZE, TEXTURE_SIZE) and picture.mode == "RGB"
-        assert np.asarray(picture).std(axis=(0, 1)).min() > 2  # grey levels: grain, not one colour
 
 
 @pytest.fixture

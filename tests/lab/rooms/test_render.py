@@ -5,7 +5,7 @@ import dataclasses
 import numpy as np
 import pytest
 
-from langflash_core.lab.rooms import HELD_OUT_LIBRARIES, Pack, RoomRenderer, make_room, render_room
+from langflash_core.lab.rooms import HELD_OUT_LIBRARIES, Pack, RoomRenderer, make_room, staged_room
 from langflash_core.lab.rooms.cameras import propose_cameras, reproject
 from tests.lab.rooms.reference import cast_ray, room_triangles
 
@@ -14,7 +14,9 @@ SIZE = (112, 112)
 
 @pytest.fixture(scope="module")
 def samples(pack: Pack, renderer: RoomRenderer):
-    return [render_room(seed, pack, renderer, size=SIZE, libraries=HELD_OUT_LIBRARIES) for seed in range(6)]
+    return [
+        staged_room(seed, pack, renderer, size=SIZE, libraries=HELD_OUT_LIBRARIES).views for seed in range(6)
+    ]
 
 
 def test_depth_and_ids_match_rays(pack: Pack, renderer: RoomRenderer) -> None:
@@ -92,7 +94,7 @@ def test_pictures_are_not_blocked(samples) -> None:
 
 
 def test_same_seed_same_sample(pack: Pack, renderer: RoomRenderer, samples) -> None:
-    again = render_room(2, pack, renderer, size=SIZE, libraries=HELD_OUT_LIBRARIES)
+    again = staged_room(2, pack, renderer, size=SIZE, libraries=HELD_OUT_LIBRARIES).views
     for field in dataclasses.fields(again):
         before, after = getattr(samples[2], field.name), getattr(again, field.name)
         assert np.array_equal(before, after) if isinstance(before, np.ndarray) else before == after
@@ -100,15 +102,15 @@ def test_same_seed_same_sample(pack: Pack, renderer: RoomRenderer, samples) -> N
 
 
 def test_more_views_and_oblong_pictures(pack: Pack, renderer: RoomRenderer) -> None:
-    views = render_room(11, pack, renderer, num_views=3, size=(84, 126), libraries=HELD_OUT_LIBRARIES)
+    views = staged_room(11, pack, renderer, num_views=3, size=(84, 126), libraries=HELD_OUT_LIBRARIES).views
     assert views.images.shape == (3, 84, 126, 3)
-    single = render_room(11, pack, renderer, num_views=1, size=(84, 84), libraries=HELD_OUT_LIBRARIES)
+    single = staged_room(11, pack, renderer, num_views=1, size=(84, 84), libraries=HELD_OUT_LIBRARIES).views
     assert single.overlap == 1.0 and single.images.shape == (1, 84, 84, 3)
 
 
 def test_bad_arguments_are_named(pack: Pack, renderer: RoomRenderer) -> None:
     with pytest.raises(ValueError, match="num_views"):
-        render_room(0, pack, renderer, num_views=0)
+        staged_room(0, pack, renderer, num_views=0)
 
 
 def test_renderer_releases_twice(pack: Pack, renderer: RoomRenderer) -> None:

@@ -3,13 +3,7 @@
 import pytest
 import torch
 
-from langflash_core.lab.training.late import (
-    leading,
-    make_cut,
-    make_whole,
-    moments,
-    nearest_answers,
-)
+from langflash_core.lab.training.late import leading, make_cut, make_whole, moments, nearest_answers
 from langflash_core.network import MINI
 from langflash_core.network.build import build_network
 from langflash_core.network.encoders.late import LateHalf

@@ -9,20 +9,13 @@ import pytest
 import torch
 
 from langflash_core.errors import InputError
-from langflash_core.lab.training.loop import LoopOptions, learning_rate, train_stage
+from langflash_core.lab.training.loop import LoopOptions, train_stage
 from langflash_core.lab.training.stages.stage import Loss
 from langflash_core.lab.training.stages.table import STAGES
 from langflash_core.lab.training.states import load_averaged
 
 OPTIONS = LoopOptions(minutes=10, max_steps=2, pictures=2, report_s=0.0, validate_s=0.0, save_s=1e9)
 STAGE = STAGES["refine"]  # the smallest
-
-
-def test_the_rate_warms_up_and_falls():
-    assert learning_rate(0, 0.0, 1.0) == pytest.approx(0.01)
-    assert learning_rate(200, 0.0, 1.0) == 1
-    assert learning_rate(200, 0.5, 1.0) == pytest.approx(0.51)
-    assert learning_rate(10_000, 1.0, 1.0) == pytest.approx(0.02)
 
 
 def test_a_run_continues_where_it_stopped(rooms, words, network, tmp_path: Path):

@@ -6,17 +6,13 @@ import pytest
 import torch
 
 from langflash_core.lab.training.batches import RoomSet
-from langflash_core.lab.training.commands import (
-    phrase_table,
-    run_find_parts,
-)
+from langflash_core.lab.training.commands import phrase_table, run_find_parts
 from langflash_core.lab.training.loop import LoopOptions
 from langflash_core.lab.training.mixing import Mixed, MixedSet, loss_of
 from langflash_core.lab.training.parts import PartSet
 from langflash_core.lab.training.shards import NOTHING, Label, write_shard
 from langflash_core.lab.training.stages.grouping import grouping_stage
 from langflash_core.lab.training.stages.stage import Loss
-from langflash_core.lab.training.stages.table import STAGES
 from langflash_core.lab.training.trained import run_export
 from langflash_core.network import MINI, load_network, save_network
 from langflash_core.network.build import build_network
@@ -139,11 +135,3 @@ def test_parts_of_photos_are_found_beside_those_of_rooms(cache, start):
     assert 0 < len(PartSet(rooms)) < len(both)
     assert count >= sum(len(room.labels) for room in both.rooms)
     assert any(label.group == "counter" for room in both.rooms for label in room.labels)
-
-
-def test_every_stage_that_reads_photos_says_how_many():
-    assert {name: stage.photos for name, stage in STAGES.items() if stage.photos} == {
-        "depth": 0.6,
-        "grouping": 0.5,
-        "aggregation": 0.5,
-    }

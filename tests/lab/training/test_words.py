@@ -5,7 +5,6 @@ import torch
 
 from langflash_core.lab.training.shards import Label
 from langflash_core.lab.training.words import BASELINES, PhraseSampler, build_table
-from langflash_core.language.spaces import NEGATIVES
 from langflash_core.language.vocabulary import further_words
 from tests.lab.training.conftest import encode
 
@@ -28,10 +27,6 @@ def test_the_table_holds_every_phrase_once():
     assert [table.phrases[row] for row in table.group_rows()] == list(table.groups)
     with pytest.raises(ValueError, match="labels"):
         build_table([], encode)
-
-
-def test_the_baselines_are_those_of_queries():
-    assert BASELINES == NEGATIVES
 
 
 def test_a_label_is_called_by_all_its_phrases_and_no_other():

@@ -3,13 +3,7 @@
 from argparse import Namespace
 from typing import TextIO
 
-from langflash_core.base.files import (
-    check_folder,
-    check_output_file,
-    filled_atomically,
-    readable_file,
-    write_atomically,
-)
+from langflash_core.base.files import filled_atomically, readable_file, write_atomically
 from langflash_core.errors import InputError
 from langflash_core.lab.evaluation.clips import clips_markdown, clips_result, judged, rendered_clip
 from langflash_core.lab.labels.making import REPORT, LabelMaker
@@ -19,6 +13,7 @@ from langflash_core.lab.rooms import RoomRenderer, load_pack
 
 from ...report import ProgressBar, write_tables
 from ..models import ordered
+from .scenes import check_files
 
 
 def labels(args: Namespace, out: TextIO) -> None:
@@ -27,10 +22,7 @@ def labels(args: Namespace, out: TextIO) -> None:
     Raises:
         LangFlashError: pack, weights or output cannot be used, or a room has no way through it.
     """
-    if args.output is not None:
-        check_output_file(args.output, (".md",))
-    if args.results is not None:
-        check_folder(args.results, "--results")
+    check_files(args)
     order = ordered(args)
     pack = load_pack(readable_file(args.pack, "furniture pack", InputError))
     maker, judgements = LabelMaker(order), []

@@ -1,86 +1,62 @@
-"""`langflash lab eval protocol`: a published data set, judged as papers judge it."""
+"""`langflash lab eval protocol`: a published data set, judged as papers judge it.
+
+All raise `LangFlashError` where what is judged, the checkpoint or the output cannot be used.
+"""
 
 from argparse import Namespace
-from collections.abc import Iterator
 from itertools import islice
 from pathlib import Path
 from typing import TYPE_CHECKING, TextIO
 
-from langflash_core.base.files import check_folder, check_output_file
+from langflash_core.base.files import check_folder
 from langflash_core.errors import InputError
+from langflash_core.lab.evaluation.bench import Bench
+from langflash_core.lab.evaluation.tables import markdown
 from langflash_core.lab.photos import PhotoFolder, open_folder
 
-from ...renderers import open_renderer
-from ...report import ProgressBar, write_tables
-from ..shared import opened_lpips
+from ...report import write_tables
+from .scenes import check_files, opened
 
 if TYPE_CHECKING:
-    from langflash_core.lab.evaluation.lpips import Lpips
     from langflash_core.lab.evaluation.tallies import Shelf
 
 
 def protocol(args: Namespace, out: TextIO) -> None:
-    """Judge a checkpoint on a data set where it lies.
-
-    Raises:
-        LangFlashError: data set, checkpoint or output cannot be used.
-    """
-    if args.output is not None:
-        check_output_file(args.output, (".md",))
+    """Judge a checkpoint on a data set where it lies."""
+    check_files(args)
     if args.work is not None:
         check_folder(args.work, "--work")
     if args.name == "nyu":
         _nyu(args, out)
         return
-    from langflash_core.lab.evaluation.case_tables import cases_markdown
-    from langflash_core.lab.evaluation.cases import Judge, Tally, case_tallies, result_of
-    from langflash_core.lab.evaluation.protocols import PROTOCOLS, Case, planned
+    from langflash_core.lab.evaluation.cases import Judge, Tally, case_tallies, cases_markdown, result_of
+    from langflash_core.lab.evaluation.protocols import planned
 
     plan = planned(args.name, args.folder, args.index)
-    lpips = opened_lpips(args.lpips)
-    with ProgressBar() as progress, open_renderer(args.backend) as renderer:
-        judge = Judge.of(
-            renderer, args.weights, preset=args.preset, size=args.size, lpips=lpips, align=args.align
+    with opened(args, Bench, words=True, align=args.align) as (bench, progress):
+        tallies = case_tallies(
+            Judge.of(bench),
+            islice(plan.cases, args.limit),
+            count=args.limit or plan.count,
+            shelf=_shelf(args, Tally, bench),
+            progress=progress,
         )
-        count = args.limit or plan.count
-
-        def told() -> Iterator[Case]:
-            for done, case in enumerate(islice(plan.cases, args.limit)):
-                progress(f"{case.name}, {done + 1} of {count or 'some'}", done / count if count else 0.0)
-                yield case
-
-        tallies = list(case_tallies(judge, told(), _shelf(args, Tally, lpips)))
-    chosen = PROTOCOLS[args.name]
-    result = {"protocol": args.name, "weights": _weights(args), **result_of(tallies)}
-    write_tables(args, result, cases_markdown(args.name, chosen.title, chosen.about, result), out)
+    result = {"protocol": args.name, "weights": bench.made_with, **result_of(tallies)}
+    write_tables(args, result, cases_markdown(args.name, result), out)
 
 
 def _nyu(args: Namespace, out: TextIO) -> None:
-    """Single photos, as `eval photos-labelled` judges them.
-
-    Raises:
-        LangFlashError: an option that single photos have no use for, or what `protocol` says.
-    """
+    """Single photos, as `eval photos-labelled` judges them."""
     for name in ("index", "lpips", "align"):
         if getattr(args, name):
             raise InputError(f"nyu judges photos one by one, without another view; leave --{name} out")
     folder = nyu_folder(args.folder)
-    ids = folder.ids[: args.limit]
-    from langflash_core.lab.evaluation.labelled import Tally, run_photos
-    from langflash_core.lab.evaluation.photo_tables import photos_markdown
+    from langflash_core.lab.evaluation.labelled import Tally, run_photos, tables
 
-    with ProgressBar() as progress, open_renderer(args.backend) as renderer:
-        result, _ = run_photos(
-            folder,
-            ids,
-            renderer,
-            args.weights,
-            preset=args.preset,
-            size=args.size,
-            shelf=_shelf(args, Tally),
-            progress=progress,
-        )
-    write_tables(args, result, photos_markdown(result), out)
+    with opened(args, Bench, words=True) as (bench, progress):
+        shelf = _shelf(args, Tally, bench)
+        result, _ = run_photos(folder, folder.ids[: args.limit], bench, shelf=shelf, progress=progress)
+    write_tables(args, result, markdown(tables(result)), out)
 
 
 def nyu_folder(path: Path) -> PhotoFolder:
@@ -104,11 +80,7 @@ def nyu_folder(path: Path) -> PhotoFolder:
     return folder
 
 
-def _weights(args: Namespace) -> str:
-    return str(args.weights) if args.weights else args.preset
-
-
-def _shelf(args: Namespace, kind: type, lpips: "Lpips | None" = None) -> "Shelf | None":
+def _shelf(args: Namespace, kind: type, bench: Bench) -> "Shelf | None":
     """Where cases are kept; another checkpoint, preset, size or data set makes them anew."""
     from langflash_core.lab.evaluation.tallies import Shelf, identity
 
@@ -120,7 +92,7 @@ def _shelf(args: Namespace, kind: type, lpips: "Lpips | None" = None) -> "Shelf 
         "weights": identity(args.weights, args.preset),
         "size": args.size,
         "index": None if args.index is None else str(args.index.resolve()),
-        "lpips": lpips and lpips.digest,
+        "lpips": bench.lpips and bench.lpips.digest,
         "align": args.align,
     }
     return Shelf(args.work / args.name, key, kind)

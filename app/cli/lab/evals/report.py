@@ -1,4 +1,7 @@
-"""`langflash lab eval report`: everything that is at hand, judged and put on one page."""
+"""`langflash lab eval report`: everything that is at hand, judged and put on one page.
+
+All raise `LangFlashError` where what is judged, the checkpoint or the output cannot be used.
+"""
 
 import shlex
 import sys
@@ -10,17 +13,18 @@ from typing import TYPE_CHECKING, TextIO
 from langflash_core.base.files import check_folder, make_folder, readable_file, write_atomically
 from langflash_core.base.running import Progress
 from langflash_core.errors import InputError, SceneFileError
+from langflash_core.lab.evaluation.bench import Bench
 from langflash_core.lab.photos import PhotoFolder, open_folder
 
 from ....bench.machine import host
-from ...renderers import Renderer, open_renderer
+from ...renderers import open_renderer
 from ...report import ProgressBar
 from ...scenes import open_scene
 from ..photos import chosen
 from ..shared import opened_lpips
 
 if TYPE_CHECKING:
-    from langflash_core.lab.evaluation.report import Sources, Workplace
+    from langflash_core.lab.evaluation.report import Sources
     from langflash_core.lab.evaluation.report_page import Report
     from langflash_core.lab.evaluation.report_parts import Section
 
@@ -31,13 +35,9 @@ WORK = "work"
 
 
 def report(args: Namespace, out: TextIO) -> None:
-    """Write report.html, .md, .json and .csv.
-
-    Raises:
-        LangFlashError: there is nothing to judge, or a source, the checkpoint or the output cannot be used.
-    """
+    """Write report.html, .md, .json and .csv."""
     from langflash_core.lab.evaluation import report_page
-    from langflash_core.lab.evaluation.report import PUBLISHED, plans
+    from langflash_core.lab.evaluation.report import PUBLISHED, Workplace, plans
     from langflash_core.lab.evaluation.tallies import identity
 
     args.only = None
@@ -56,7 +56,8 @@ def report(args: Namespace, out: TextIO) -> None:
     with ProgressBar() as progress:
         drawn = [] if args.scene is None else [_drawing(args.scene, progress)]  # while nothing else runs
         with open_renderer(args.backend) as renderer:
-            place = _workplace(args, renderer, progress)
+            bench = Bench(renderer, args.weights, args.preset, lpips=opened_lpips(args.lpips))
+            place = Workplace(bench, args.output / WORK, progress)
             found = [judge(place) for judge in judges] + drawn
             drawn_by = renderer.backend
     name = args.weights.name if args.weights else args.preset
@@ -98,13 +99,6 @@ def _sources(args: Namespace) -> "Sources":
     posed, photos = _posed_folder(args.posed), _labelled_folder(args)
     ids = () if photos is None else chosen(args, photos)
     return Sources(args.rooms, args.pack, posed, photos, ids, args.limit)
-
-
-def _workplace(args: Namespace, renderer: Renderer, progress: Progress) -> "Workplace":
-    from langflash_core.lab.evaluation.report import Workplace
-
-    lpips = opened_lpips(args.lpips)
-    return Workplace(renderer, args.output / WORK, args.weights, args.preset, progress, lpips)
 
 
 def _write_small(made: "Report", folder: Path) -> None:

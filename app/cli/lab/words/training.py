@@ -1,12 +1,12 @@
 """The words of furnished rooms and of training on them and on photos."""
 
 import argparse
-from pathlib import Path
 
 from langflash_core.network.presets import PRECISIONS
 
-from ...values import above_zero, minutes, part, seed, share, size, whole_count
-from ...words.shared import add_description, add_json, add_output, new_actions, new_command
+from ...values import above_zero, minutes, seed, share, size, whole_count
+from ...words.shared import add_json, add_output, new_actions, new_command
+from .common import add_cache, add_count, add_device, add_folder, add_part, add_path, add_preset, add_switch
 
 # langflash_core.lab.photos.layouts.LAYOUTS, which would bring torch along.
 LAYOUTS = (
@@ -18,14 +18,14 @@ def add_rooms(commands) -> None:
     """`langflash lab rooms`."""
     actions = new_actions(commands, "rooms", "make furnished rooms for training and tests")
     pack = new_command(actions, "pack", "furniture libraries (.sh3f) to one pack")
-    pack.add_argument("folder", type=Path, metavar="FOLDER")
+    add_path(pack, "folder", "FOLDER")
     add_output(pack, "PACK", "the pack to write")
     preview = new_command(actions, "preview", "a contact sheet of rooms")
-    preview.add_argument("pack", type=Path, metavar="PACK")
+    add_path(preview, "pack", "PACK")
     add_output(preview, "IMG", "the .png to write")
     _add_seeds(preview, count=9)
     render = new_command(actions, "render", "rooms with depth, instances and names, one .npz each")
-    render.add_argument("pack", type=Path, metavar="PACK")
+    add_path(render, "pack", "PACK")
     add_output(render, "DIR", "folder to fill; rooms that are there are kept")
     _add_seeds(render, count=100)
     render.add_argument("--views", type=whole_count, default=2, metavar="V", help="(default: 2)")
@@ -34,10 +34,8 @@ def add_rooms(commands) -> None:
 
 def _add_seeds(command: argparse.ArgumentParser, *, count: int) -> None:
     command.add_argument("--seed", type=seed, default=0, metavar="N", help="the first room (default: 0)")
-    command.add_argument(
-        "--count", type=whole_count, default=count, metavar="N", help=f"rooms (default: {count})"
-    )
-    command.add_argument("--held-out", action="store_true", help="furniture that training never sees")
+    add_count(command, "--count", f"rooms (default: {count})", count)
+    add_switch(command, "--held-out", "furniture that training never sees")
 
 
 def add_labels(commands) -> None:
@@ -49,34 +47,26 @@ def add_labels(commands) -> None:
         epilog="The exit code is 0 when all clips are done, 1 when some failed (ledger.csv says why), "
         "2 for bad input, 130 after Ctrl-C.",
     )
-    command.add_argument(
+    add_path(
+        command,
         "source",
-        type=Path,
-        metavar="CLIP|FOLDER",
-        help="a folder of frames in order of their names (or images/ with K.txt and poses.txt), a folder of "
+        "CLIP|FOLDER",
+        "a folder of frames in order of their names (or images/ with K.txt and poses.txt), a folder of "
         "such folders, or a split of RealEstate10K in chunks (index.json)",
     )
     add_output(command, "OUT", "gets a folder a clip (labels and report.html), ledger.csv and summary.html")
     add_label_models(command)
     command.add_argument("--start", type=seed, default=0, metavar="N", help="the first frame (default: 0)")
-    command.add_argument("--count", type=whole_count, metavar="N", help="at most so many frames of each clip")
-    command.add_argument(
-        "--step", type=whole_count, default=1, metavar="N", help="every so manyth frame (default: 1)"
-    )
-    command.add_argument(
-        "--workers", type=whole_count, metavar="N", help="processes side by side (default: this one alone)"
-    )
+    add_count(command, "--count", "at most so many frames of each clip")
+    add_count(command, "--step", "every so manyth frame (default: 1)", 1)
+    add_count(command, "--workers", "processes side by side (default: this one alone)")
     command.add_argument(
         "--address", metavar="RAY", help="a Ray cluster instead of processes: host:port, auto, or local"
     )
     inside = command.add_mutually_exclusive_group()
-    inside.add_argument(
-        "--enrich", action="store_true", help="put labels into the split's chunks afterwards, in place"
-    )
-    inside.add_argument(
-        "--extract", action="store_true", help="make no labels: take those in the split's chunks out to OUT"
-    )
-    command.add_argument("--device", choices=("cpu", "cuda"), default="cpu", help="(default: cpu)")
+    add_switch(inside, "--enrich", "put labels into the split's chunks afterwards, in place")
+    add_switch(inside, "--extract", "make no labels: take those in the split's chunks out to OUT")
+    add_device(command)
     add_json(command)
 
 
@@ -120,30 +110,26 @@ def add_train(commands) -> None:
     """`langflash lab train`."""
     actions = new_actions(commands, "train", "train the network on rendered rooms")
     adopt = new_command(actions, "adopt", "published weights of the frozen parts to a file to start from")
-    adopt.add_argument("encoder", type=Path, metavar="ENCODER", help="timm state dict, .safetensors")
-    adopt.add_argument("local", type=Path, metavar="XFEAT", help="XFeat's state dict, .safetensors")
+    add_path(adopt, "encoder", "ENCODER", "timm state dict, .safetensors")
+    add_path(adopt, "local", "XFEAT", "XFeat's state dict, .safetensors")
     add_output(adopt, "FILE", "the .safetensors to write")
-    adopt.add_argument("--preset", choices=("mini",), default="mini", help="(default: mini)")
+    add_preset(adopt)
     _add_cache(actions)
     _add_convert(actions)
     _add_outlines(actions)
     _add_opinions(actions)
     parts = new_command(actions, "parts", "find the parts of cached rooms, for the stage naming")
-    parts.add_argument("cache", type=Path, metavar="CACHE", help="made by train cache")
-    parts.add_argument(
-        "--run", type=Path, metavar="RUN", help="folder of train run whose stages are used (default: none)"
-    )
-    parts.add_argument(
-        "--part", type=part, default=(0, 1), metavar="I/N", help="the I-th of N processes, from 0"
-    )
+    add_cache(parts)
+    add_path(parts, "--run", "RUN", "folder of train run whose stages are used (default: none)")
+    add_part(parts)
     _add_start(parts)
     _add_late(actions)
     _add_second(actions)
     _add_stages(actions)
     export = new_command(actions, "export", "all stages of a run to one checkpoint")
-    export.add_argument("run", type=Path, metavar="RUN")
+    add_path(export, "run", "RUN")
     add_output(export, "FILE", "the .safetensors to write")
-    export.add_argument("--metadata", type=Path, metavar="JSON", help="an object to add to the model card")
+    add_path(export, "--metadata", "JSON", "an object to add to the model card")
     export.add_argument(
         "--named",
         type=share,
@@ -158,71 +144,46 @@ def _add_cache(actions) -> None:
     cache = new_command(
         actions, "cache", "render and encode one set of rooms, or encode photos; an interrupted run continues"
     )
-    cache.add_argument("pack", type=Path, nargs="?", metavar="PACK", help="made by rooms pack")
-    cache.add_argument(
-        "--photos",
-        type=Path,
-        dest="folder",
-        metavar="FOLDER",
-        help="instead of rooms, a folder of labelled photos as train photos makes it",
-    )
-    add_description(cache)
-    cache.add_argument(
-        "--copies",
-        type=whole_count,
-        default=1,
-        metavar="N",
-        help="views of each photo (default: 1, as it is)",
-    )
+    add_path(cache, "pack", "PACK", "made by rooms pack", nargs="?")
+    purpose = "instead of rooms, a folder of labelled photos as train photos makes it"
+    add_folder(cache, purpose, name="--photos")
+    add_count(cache, "--copies", "views of each photo (default: 1, as it is)", 1)
     add_output(cache, "CACHE", "folder to fill")
     cache.add_argument("--set", choices=("train", "validation", "held_out"), default="train")
-    cache.add_argument("--scenes", type=whole_count, default=4096, metavar="N", help="(default: 4096)")
-    cache.add_argument(
-        "--part", type=part, default=(0, 1), metavar="I/N", help="the I-th of N processes, from 0"
-    )
+    add_count(cache, "--scenes", "(default: 4096)", 4096)
+    add_part(cache)
     _add_start(cache, presets=("mini", "full"))
 
 
 def _add_stages(actions) -> None:
     run = new_command(actions, "run", "train stages, one after the other; continues where a run stopped")
-    run.add_argument("cache", type=Path, metavar="CACHE", help="made by train cache")
+    add_cache(run)
     add_output(run, "RUN", "folder of checkpoints and logs")
     run.add_argument("--stages", nargs="+", metavar="STAGE", help="such as depth refine gaussians")
     run.add_argument("--minutes", nargs="+", type=minutes, metavar="M", help="one per stage")
     run.add_argument(
         "--recipe", metavar="NAME", help="instead: stages with all their numbers, 'paper' or a .toml"
     )
-    run.add_argument(
+    add_path(
+        run,
         "--scenes",
-        type=Path,
-        metavar="FOLDER",
-        help="grouping and aggregation learn from this data set as it was unpacked, ScanNet or labelled "
+        "FOLDER",
+        "grouping and aggregation learn from this data set as it was unpacked, ScanNet or labelled "
         "chunks of RealEstate10K, or posed clips with --labels, instead of cached rooms",
     )
-    run.add_argument(
-        "--labels",
-        type=Path,
-        metavar="OUT",
-        help="of --scenes: what langflash lab labels wrote of these clips",
-    )
-    run.add_argument(
+    add_path(run, "--labels", "OUT", "of --scenes: what langflash lab labels wrote of these clips")
+    add_path(
+        run,
         "--outlined",
-        type=Path,
+        "FOLDER",
+        "photos from which grouping learns besides: outlined, as train outlines makes them, or named",
         nargs="+",
         default=[],
-        metavar="FOLDER",
-        help="photos from which grouping learns besides: outlined, as train outlines makes them, or named",
     )
     _add_loop(run)
-    run.add_argument(
-        "--sam-teacher",
-        type=Path,
-        metavar="FILE",
-        help="weights of MobileSAM (mobile_sam.pt), whose embedding grouping regresses besides",
-    )
-    run.add_argument(
-        "--from-scratch", action="store_true", help="draw the heads anew instead of going on with --start's"
-    )
+    purpose = "weights of MobileSAM (mobile_sam.pt), whose embedding grouping regresses besides"
+    add_path(run, "--sam-teacher", "FILE", purpose)
+    add_switch(run, "--from-scratch", "draw the heads anew instead of going on with --start's")
     _add_start(run, presets=("mini", "full"))
 
 
@@ -232,30 +193,18 @@ def _add_opinions(actions) -> None:
         "opinions",
         "keep beside photos what another network says of them, for train late --more; what is done stays",
     )
-    command.add_argument("folder", type=Path, metavar="FOLDER", help="photos, as train photos makes them")
-    add_description(command)
-    command.add_argument(
-        "--weights",
-        type=Path,
-        required=True,
-        metavar="FILE",
-        help="the network, .tflite: scores of names a pixel",
-    )
-    command.add_argument(
-        "--part", type=part, default=(0, 1), metavar="I/N", help="the I-th of N processes, from 0"
-    )
+    add_folder(command, "photos, as train photos makes them")
+    add_path(command, "--weights", "FILE", "the network, .tflite: scores of names a pixel", required=True)
+    add_part(command)
 
 
 def _add_outlines(actions) -> None:
     command = new_command(
         actions, "outlines", "outline what could be an object in photos without labels; what is done stays"
     )
-    command.add_argument("folder", type=Path, metavar="FOLDER", help="photos, as train photos makes them")
-    add_description(command)
+    add_folder(command, "photos, as train photos makes them")
     add_output(command, "OUT", "folder to fill: the photos, cropped, with maps of their objects")
-    command.add_argument(
-        "--weights", type=Path, required=True, metavar="FILE", help="of MobileSAM (mobile_sam.pt)"
-    )
+    add_path(command, "--weights", "FILE", "of MobileSAM (mobile_sam.pt)", required=True)
     command.add_argument(
         "--side",
         type=whole_count,
@@ -263,13 +212,9 @@ def _add_outlines(actions) -> None:
         metavar="PX",
         help="the square that MobileSAM sees (default: 512; 1024 takes four times as long)",
     )
-    command.add_argument(
-        "--grid", type=whole_count, default=12, metavar="N", help="points along the longer side (default: 12)"
-    )
-    command.add_argument("--device", choices=("cpu", "cuda"), default="cpu", help="(default: cpu)")
-    command.add_argument(
-        "--part", type=part, default=(0, 1), metavar="I/N", help="the I-th of N processes, from 0"
-    )
+    add_count(command, "--grid", "points along the longer side (default: 12)", 12)
+    add_device(command)
+    add_part(command)
 
 
 def _add_late(actions) -> None:
@@ -277,20 +222,17 @@ def _add_late(actions) -> None:
         actions, "late", "train the late halves of the encoder, names and depth, on labelled photos and rooms"
     )
     _add_labelled(late)
-    late.add_argument(
+    add_path(
+        late,
         "--more",
-        type=Path,
+        "FOLDER",
+        "other photos, labelled, in part or not at all: learning goes on from what the weights have, "
+        "and an average of the weights teaches what nobody labelled",
         nargs="+",
         default=[],
-        metavar="FOLDER",
-        help="other photos, labelled, in part or not at all: learning goes on from what the weights have, "
-        "and an average of the weights teaches what nobody labelled",
     )
-    late.add_argument(
-        "--names",
-        action="store_true",
-        help="with --more: names alone learn, depth stays as it is: a third more steps in the same time",
-    )
+    purpose = "with --more: names alone learn, depth stays as it is: a third more steps in the same time"
+    add_switch(late, "--names", purpose)
     _add_budget(late)
 
 
@@ -299,30 +241,21 @@ def _add_second(actions) -> None:
         actions, "second", "train what reads other networks' maps, on labelled photos and rooms"
     )
     _add_labelled(second)
-    second.add_argument(
-        "--more", type=Path, nargs="+", default=[], metavar="FOLDER", help="other photos that name something"
-    )
-    second.add_argument(
+    add_path(second, "--more", "FOLDER", "other photos that name something", nargs="+", default=[])
+    add_path(
+        second,
         "--weights",
-        type=Path,
+        ("DEEPLAB", "MOSAIC"),
+        "DeepLab of 150 names on MobileNetV2, MOSAIC R4: .tflite (default: those of the weights file)",
         nargs=2,
-        metavar=("DEEPLAB", "MOSAIC"),
-        help="DeepLab of 150 names on MobileNetV2, MOSAIC R4: .tflite (default: those of the weights file)",
     )
     _add_budget(second)
 
 
 def _add_labelled(command: argparse.ArgumentParser) -> None:
-    command.add_argument("cache", type=Path, metavar="CACHE", help="rooms, made by train cache")
-    command.add_argument(
-        "--photos",
-        type=Path,
-        dest="folder",
-        metavar="FOLDER",
-        required=True,
-        help="labelled photos, as train photos makes them; every seventh run of numbers is kept to validate",
-    )
-    add_description(command)
+    add_cache(command, "rooms, made by train cache")
+    purpose = "labelled photos, as train photos makes them; every seventh run of numbers is kept to validate"
+    add_folder(command, purpose, name="--photos", required=True)
 
 
 def _add_budget(command: argparse.ArgumentParser) -> None:
@@ -334,15 +267,10 @@ def _add_budget(command: argparse.ArgumentParser) -> None:
 
 def _add_loop(command: argparse.ArgumentParser) -> None:
     """What every training loop can be told."""
-    command.add_argument("--max-steps", type=whole_count, metavar="N", help="stop each stage earlier")
+    add_count(command, "--max-steps", "stop each stage earlier")
     command.add_argument("--device", choices=("cpu", "cuda"), default="cpu")
     command.add_argument("--seed", type=seed, default=0, metavar="N")
-    command.add_argument(
-        "--batches",
-        type=whole_count,
-        metavar="N",
-        help="that a step is made of, shared by the processes (default: one each)",
-    )
+    add_count(command, "--batches", "that a step is made of, shared by the processes (default: one each)")
     command.add_argument(
         "--workers",
         type=seed,
@@ -353,37 +281,24 @@ def _add_loop(command: argparse.ArgumentParser) -> None:
     command.add_argument(
         "--rate", type=above_zero, metavar="R", help="the peak learning rate (default: the stage's)"
     )
-    command.add_argument(
-        "--pictures",
-        type=whole_count,
-        metavar="N",
-        help="of a step, of each kind (default: the stage's)",
-    )
+    add_count(command, "--pictures", "of a step, of each kind (default: the stage's)")
     command.add_argument("--precision", choices=PRECISIONS, default="auto")
-    command.add_argument("--board", action="store_true", help="also write TensorBoard's logs, in RUN/board")
+    add_switch(command, "--board", "also write TensorBoard's logs, in RUN/board")
 
 
 def _add_convert(actions) -> None:
     command = new_command(actions, "photos", "a published data set to a folder of labelled photos")
     command.add_argument("layout", choices=LAYOUTS, metavar="LAYOUT", help=", ".join(LAYOUTS))
-    command.add_argument("source", type=Path, metavar="SOURCE", help="the folder or file as downloaded")
+    add_path(command, "source", "SOURCE", "the folder or file as downloaded")
     add_output(command, "FOLDER", "folder to fill; photos that are there are kept")
-    command.add_argument(
-        "--splits", type=Path, metavar="FILE", help="nyu: splits.mat, for its training split"
-    )
-    command.add_argument("--classes", type=Path, metavar="FILE", help="nyu: classMapping40.mat")
-    command.add_argument(
-        "--images", type=Path, metavar="FOLDER", help="of coco layouts: where the photos are"
-    )
-    command.add_argument("--camera", type=Path, metavar="FILE", help="frames: K, nine numbers")
-    command.add_argument("--limit", type=whole_count, metavar="N", help="only the first N photos")
+    add_path(command, "--splits", "FILE", "nyu: splits.mat, for its training split")
+    add_path(command, "--classes", "FILE", "nyu: classMapping40.mat")
+    add_path(command, "--images", "FOLDER", "of coco layouts: where the photos are")
+    add_path(command, "--camera", "FILE", "frames: K, nine numbers")
+    add_count(command, "--limit", "only the first N photos")
 
 
 def _add_start(command: argparse.ArgumentParser, presets: tuple[str, ...] = ("mini",)) -> None:
-    command.add_argument("--preset", choices=presets, default="mini", help="(default: mini)")
-    command.add_argument(
-        "--start",
-        type=Path,
-        metavar="PATH",
-        help="weights to begin with; their encoder stays as it is (default: the shipped ones)",
-    )
+    add_preset(command, presets)
+    purpose = "weights to begin with; their encoder stays as it is (default: the shipped ones)"
+    add_path(command, "--start", "PATH", purpose)

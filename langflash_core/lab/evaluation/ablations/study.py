@@ -19,7 +19,7 @@ from langflash_core.base.running import Progress
 from langflash_core.geometry.cameras import invert_rigid, transform, unproject
 from langflash_core.lab.evaluation.ablations.groupings import point_groups, regrouped, true_names
 from langflash_core.lab.evaluation.drawing import drawn_features, placed_gaussians
-from langflash_core.lab.evaluation.rooms.run import open_rooms, true_scale
+from langflash_core.lab.evaluation.rooms.run import named_records, open_rooms, true_scale
 from langflash_core.lab.evaluation.rooms.tally import Setting
 from langflash_core.lab.evaluation.rooms.target import (
     class_rows,
@@ -29,7 +29,7 @@ from langflash_core.lab.evaluation.rooms.target import (
     upsampled,
 )
 from langflash_core.lab.evaluation.rooms.truth import opened, records, seen_by_photos, true_masks, views_of
-from langflash_core.lab.evaluation.tallies import MEASURES, Shelf, collected, identity
+from langflash_core.lab.evaluation.tallies import MEASURES, Noted, Shelf, identity
 from langflash_core.lab.training.shards import RoomRecord
 from langflash_core.language.channels import Decoder, principal
 from langflash_core.network.model import Seen, pooled_weights
@@ -61,15 +61,10 @@ once is left out: K atoms, or a decoder."""
 
 
 @dataclass
-class Tally:
-    """counts: confusion by (row, list of labels) in the new view; numbers: per room, by name."""
+class Tally(Noted):
+    """counts: confusion by (row, list of labels) in the new view."""
 
     counts: dict[tuple[str, str], Tensor] = field(default_factory=dict)
-    numbers: dict[str, list[float]] = field(default_factory=dict)
-
-    def note(self, **values: float) -> None:
-        for name, value in values.items():
-            self.numbers.setdefault(name, []).append(float(value))
 
 
 @dataclass(frozen=True)
@@ -98,39 +93,34 @@ class Fits:
     residual: Tensor
 
 
-def room_studies(
+def opened_study(
     data: Path,
     weights: Path | None = None,
     *,
     limit: int | None = None,
     most: int | None = None,
     shelf: Shelf | None = None,
-    kind: str = "held_out",
     progress: Progress = lambda stage, fraction: None,
-) -> tuple[Setting, int, Iterator[tuple[str, Tally]]]:
-    """The setting, how many rooms there are, and seed and tally of each, in order.
+) -> tuple[Setting, Fits, int, Iterator[tuple[str, RoomRecord]]]:
+    """The setting, what is fitted, how many rooms there are, and seed and record of each, in order.
 
     Args:
         data: cache folder; `held_out` is judged, decoders are fitted on `train`. most: of the rooms,
-            taken evenly (None: all). shelf: keeps tallies, and what is fitted on, for the next run.
-            kind: "validation" for choosing numbers.
+            taken evenly (None: all). shelf: keeps what is fitted on for the next run.
 
     Raises:
         InputError: there is no such cache. WeightsError: the weights do not fit.
     """
-    setting, rooms = open_rooms(data, weights, limit=limit, kind=kind)
+    setting, rooms = open_rooms(data, weights, limit=limit)
     source = f"{MEASURES}, {identity(weights, 'mini')}, {data.resolve()}"
     fits = _fits(setting, data, None if shelf is None else shelf.folder / FITS, source, progress)
-    if shelf is not None:  # rows of a confusion table are the groups of the rooms at hand
-        shelf = replace(shelf, key={**shelf.key, "groups": setting.groups})
-
-    def judge(record: RoomRecord) -> Tally:
-        return judge_room(setting, fits, record)
-
     every = 1 if most is None else max(1, -(-len(rooms) // most))
-    chosen = islice(records(rooms), 0, None, every)
-    studies = collected(((str(record.seed), record) for record in chosen), judge, shelf)
-    return setting, -(-len(rooms) // every), studies
+    return setting, fits, -(-len(rooms) // every), islice(named_records(rooms), 0, None, every)
+
+
+def grouped_shelf(shelf: Shelf, setting: Setting) -> Shelf:
+    """For tallies: rows of a confusion table are the groups of the rooms at hand."""
+    return replace(shelf, key={**shelf.key, "groups": setting.groups})
 
 
 def _fits(setting: Setting, data: Path, kept: Path | None, source: str, progress: Progress) -> Fits:
@@ -210,7 +200,7 @@ class _Room:
 
 
 @torch.no_grad()
-def judge_room(setting: Setting, fits: Fits, record: RoomRecord) -> Tally:
+def judge(setting: Setting, fits: Fits, record: RoomRecord) -> Tally:
     """Every rival on one room of at least three views."""
     tally = Tally()
     views = views_of(record, (0, 1))

@@ -4,10 +4,9 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 from langflash_core.lab.evaluation.ablations.study import BYTES, CHANNELS, GROUPS, KEPT, RESIDUAL, Tally
-from langflash_core.lab.evaluation.numbers import rounded
-from langflash_core.lab.evaluation.report_parts import Plot, Point, Table, table_lines
+from langflash_core.lab.evaluation.report_parts import Plot, Point
 from langflash_core.lab.evaluation.speed import PAPER_MS
-from langflash_core.lab.evaluation.tables import cell
+from langflash_core.lab.evaluation.tables import Table, cell, markdown, rounded
 from langflash_core.lab.training.measures import accuracy, mean_iou, nan_mean
 
 GROUPINGS = {
@@ -62,7 +61,7 @@ def summary(tally: Tally) -> dict[str, Any]:
     for (row, kind), counts in tally.counts.items():
         own = labels.setdefault(row, {})
         own |= {f"{kind}_accuracy": accuracy(counts), f"{kind}_miou": mean_iou(counts)}
-    measures = {name: nan_mean(values) for name, values in tally.numbers.items()}
+    measures = tally.means()
     base = tally.numbers.get("atoms_ms", [])
     for name, values in tally.numbers.items():
         if name.endswith("_ms") and base:  # room by room, so that a busy machine slows both
@@ -112,10 +111,7 @@ def _point(
 
 def ablation_markdown(result: Mapping[str, Any]) -> str:
     """All tables."""
-    lines = [f"{result['scenes']} rooms, weights {result['weights']}", ""]
-    for table in ablation_tables(result):
-        lines += [*table_lines(table), ""]
-    return "\n".join(lines)
+    return markdown(ablation_tables(result), f"{result['scenes']} rooms, weights {result['weights']}")
 
 
 def _values(result: Mapping[str, Any], row: str) -> tuple[str, ...]:

@@ -4,18 +4,11 @@ import torch
 from torch import Tensor
 
 from langflash_core.geometry.cameras import unproject
-from langflash_core.lab.evaluation.metrics import (
-    point_error,
-    pose_error,
-)
+from langflash_core.lab.evaluation.metrics import point_error, pose_error
 from langflash_core.lab.evaluation.rooms.tally import Setting, Tally
 from langflash_core.lab.evaluation.rooms.truth import relative, views_of
 from langflash_core.lab.rooms.cameras import overlap_fraction
-from langflash_core.lab.training.measures import (
-    abs_rel,
-    align_scale,
-    delta1,
-)
+from langflash_core.lab.training.measures import abs_rel, align_scale, delta1
 from langflash_core.lab.training.shards import RoomRecord
 from langflash_core.types import Prediction
 

@@ -4,13 +4,12 @@ import torch
 from torch import Tensor
 from torch.nn import functional as F
 
-from langflash_core.lab.evaluation.numbers import mask_iou, rounded
+from langflash_core.lab.evaluation.metrics import mask_iou
 from langflash_core.lab.evaluation.rooms.tally import MIN_SHARE, Setting, Tally
 from langflash_core.lab.evaluation.rooms.truth import group_mask, visible_groups
+from langflash_core.lab.evaluation.tables import rounded
 from langflash_core.lab.evaluation.words import PARAPHRASES, absent_phrases
-from langflash_core.lab.training.measures import (
-    nan_mean,
-)
+from langflash_core.lab.training.measures import nan_mean
 from langflash_core.lab.training.shards import RoomRecord
 from langflash_core.language.answers import presence_scores
 from langflash_core.language.relevance import relevancy, rival_terms

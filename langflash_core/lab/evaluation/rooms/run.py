@@ -22,10 +22,8 @@ from langflash_core.lab.evaluation.rooms.summary import summary
 from langflash_core.lab.evaluation.rooms.tally import Setting, Tally
 from langflash_core.lab.evaluation.rooms.target import judge_views
 from langflash_core.lab.evaluation.rooms.truth import median_depth, opened, records, views_of
-from langflash_core.lab.evaluation.sights import (
-    Look,
-)
-from langflash_core.lab.evaluation.tallies import Shelf, collected, merged
+from langflash_core.lab.evaluation.sights import Look
+from langflash_core.lab.evaluation.tallies import judged, merged
 from langflash_core.lab.training.batches import RoomSet
 from langflash_core.lab.training.shards import RoomRecord
 from langflash_core.network import LangFlashNet, load_network
@@ -50,10 +48,12 @@ def run_eval(
         InputError: there is no such cache. WeightsError: the weights do not fit.
     """
     setting, held_out = open_rooms(data, weights, preset=preset, limit=limit)
-    tallies: dict[str, Tally] = {}
-    for name, tally in room_tallies(setting, held_out):
-        tallies[name] = tally
-        log.info("scene %s (%d of %d)", name, len(tallies), len(held_out))
+    tallies = judged(
+        named_records(held_out),
+        lambda record, _: judge(setting, record),
+        count=len(held_out),
+        progress=lambda stage, fraction: log.info("scene %s", stage),
+    )
     return {
         "weights": str(weights) if weights else preset,
         "scenes": len(tallies),
@@ -71,36 +71,27 @@ def open_rooms(
     preset: str = "mini",
     limit: int | None = None,
     lpips: Lpips | None = None,
-    kind: str = "held_out",
 ) -> tuple[Setting, RoomSet]:
     """What `run_eval` judges with, and the rooms that it judges.
 
     Raises:
         InputError: there is no such cache. WeightsError: the weights do not fit.
     """
-    rooms = opened(data / kind, limit)
+    rooms = opened(data / "held_out", limit)
     network = load_network(preset, weights)
     groups = sorted({label.group for label in rooms.labels()})
     return Setting.of(network, groups, median_depth(data), lpips), rooms
 
 
-def room_tallies(
-    setting: Setting, rooms: RoomSet, shelf: Shelf | None = None, look: Look | None = None
-) -> Iterator[tuple[str, Tally]]:
-    """Seed and tally of every room, in order; those on the shelf are not judged again."""
-
-    def judge(record: RoomRecord) -> Tally:
-        tally = Tally()
-        judge_scene(setting, record, tally, look)
-        return tally
-
-    return collected(((str(record.seed), record) for record in records(rooms)), judge, shelf)
+def named_records(rooms: RoomSet) -> Iterator[tuple[str, RoomRecord]]:
+    """Seed and room, in order."""
+    return ((str(record.seed), record) for record in records(rooms))
 
 
 def asked_rooms(network: LangFlashNet, data: Path, *, limit: int | None = None) -> Tally:
     """Scores, truths and mask overlaps of phrases in `data/validation`, whose furniture no training saw.
 
-    The sets "there" and "not there" are those of `judge_scene`. Every second question uses another word
+    The sets "there" and "not there" are those of `judge`. Every second question uses another word
     of the vocabulary instead of the plain name, because people do.
     """
     rooms = opened(data / "validation", limit)
@@ -113,8 +104,9 @@ def asked_rooms(network: LangFlashNet, data: Path, *, limit: int | None = None) 
     return tally
 
 
-def judge_scene(setting: Setting, record: RoomRecord, tally: Tally, look: Look | None = None) -> None:
-    """Everything about one scene of at least three views; adds to `tally`."""
+def judge(setting: Setting, record: RoomRecord, look: Look | None = None) -> Tally:
+    """Everything about one scene of at least three views."""
+    tally = Tally()
     views = views_of(record, (0, 1))
     start = time.perf_counter()
     prediction = setting.network.predict(views)
@@ -125,6 +117,7 @@ def judge_scene(setting: Setting, record: RoomRecord, tally: Tally, look: Look |
     judge_geometry(setting, record, prediction, scale, tally)
     ask_phrases(setting, record, prediction, tally)
     judge_views(setting, record, prediction, scale, tally, look)
+    return tally
 
 
 def true_scale(depths: Tensor, truth: Tensor) -> float:

@@ -8,10 +8,9 @@ import torch
 from torch import Tensor
 
 from langflash_core.lab.evaluation.lpips import Lpips
-from langflash_core.lab.evaluation.metrics import (
-    PoseError,
-)
+from langflash_core.lab.evaluation.metrics import PoseError
 from langflash_core.lab.evaluation.segments import Panoptic
+from langflash_core.lab.evaluation.tallies import Noted
 from langflash_core.lab.evaluation.words import OTHER, PAPER_LABELS
 from langflash_core.language.spaces import LanguageSpace, language_space
 from langflash_core.network import LangFlashNet
@@ -22,13 +21,12 @@ MIN_SHARE = 0.004
 
 
 @dataclass
-class Tally:
-    """What a run collects: numbers per scene by name, confusion counts by (row, view, label set),
+class Tally(Noted):
+    """What a run collects: confusion counts by (row, view, label set),
     presence scores, per present phrase its mask's IoU at each of `MASK_THRESHOLDS`, and per
     paraphrase its IoU and that of the plain names, a pair for each scene that shows it; segments of the
     target view against true instances."""
 
-    numbers: dict[str, list[float]] = field(default_factory=dict)
     counts: dict[tuple[str, str, str], Tensor] = field(default_factory=dict)
     scores: list[Tensor] = field(default_factory=list)
     truths: list[Tensor] = field(default_factory=list)
@@ -36,10 +34,6 @@ class Tally:
     mask_ious: list[Tensor] = field(default_factory=list)
     paraphrases: dict[str, list[tuple[float, float]]] = field(default_factory=dict)
     panoptic: Panoptic = field(default_factory=Panoptic)
-
-    def note(self, **values: float) -> None:
-        for name, value in values.items():
-            self.numbers.setdefault(name, []).append(float(value))
 
     def count(self, key: tuple[str, str, str], table: Tensor) -> None:
         self.counts[key] = self.counts[key] + table if key in self.counts else table

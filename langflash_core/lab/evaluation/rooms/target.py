@@ -10,11 +10,11 @@ from torch.nn import functional as F
 from langflash_core.lab.evaluation.alignment import aligned_camera
 from langflash_core.lab.evaluation.consistency import label_consistency
 from langflash_core.lab.evaluation.drawing import drawn_features, drawn_frame, placed_gaussians
-from langflash_core.lab.evaluation.pictures import ssim
 from langflash_core.lab.evaluation.rooms.phrases import note_paraphrases
 from langflash_core.lab.evaluation.rooms.tally import MIN_SHARE, STUFF, Setting, Tally
 from langflash_core.lab.evaluation.rooms.truth import relative, seen_by_photos, true_masks, views_of
 from langflash_core.lab.evaluation.segments import instance_iou, label_border_f, panoptic
+from langflash_core.lab.evaluation.sharp_measures import ssim
 from langflash_core.lab.evaluation.sights import (
     Look,
     Sight,
@@ -25,10 +25,7 @@ from langflash_core.lab.evaluation.sights import (
 )
 from langflash_core.lab.evaluation.words import PAPER_LABELS, paper_label
 from langflash_core.lab.training.losses import ssim_map
-from langflash_core.lab.training.measures import (
-    confusion,
-    psnr,
-)
+from langflash_core.lab.training.measures import confusion, psnr
 from langflash_core.lab.training.shards import RoomRecord
 from langflash_core.network import LangFlashNet
 from langflash_core.network.encoders.shared import Tokens
