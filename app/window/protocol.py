@@ -7,6 +7,7 @@ if TYPE_CHECKING:
 
 
 class Command(Protocol):
-    """Anything with a pure change of state."""
+    """Anything with a pure change of state; here none, for what only effects act on."""
 
-    def apply(self, state: "State") -> "State": ...
+    def apply(self, state: "State") -> "State":
+        return state

@@ -26,7 +26,7 @@ from .drawing.values import Stand, View
 from .editing.state import Point, Reading
 from .governor import Around, Governor
 from .scene.memory import SceneMemory
-from .state import State
+from .state import State, Stats
 
 if TYPE_CHECKING:
     from torch import Tensor
@@ -320,25 +320,19 @@ class Viewport:
         """Whether the finer picture could not be drawn; it is tried again."""
         return self.picture is not None and self.picture.failing
 
-    @property
-    def passes(self) -> tuple[tuple[str, int], ...]:
-        """Passes run so far, by kind."""
-        return () if self._renderer is None else tuple(sorted(self._renderer.passes.items()))
-
-    @property
-    def depth_range(self) -> tuple[float, float]:
-        """Depths of the first and the last colour of the depth picture, scene units."""
-        return (0.0, 1.0) if self._renderer is None else self._renderer.depth_range
-
-    @property
-    def picture_seconds(self) -> float:
-        """That the picture on show took."""
-        return 0.0 if self.picture is None else self.picture.easel.seconds
-
-    @property
-    def picture_size(self) -> tuple[int, int]:
-        """Of the picture on show, its own pixels."""
-        return (0, 0) if self.picture is None else self.picture.easel.size
+    def stats(self, frame_seconds: float = 0.0, card: str = "") -> Stats:
+        """Figures of the picture on show, beside these of the frame and the graphics device."""
+        easel, renderer = None if self.picture is None else self.picture.easel, self._renderer
+        return Stats(
+            frame_seconds,
+            0.0 if easel is None else easel.seconds,
+            (0, 0) if easel is None else easel.size,
+            card,
+            (0.0, 1.0) if renderer is None else renderer.depth_range,
+            () if renderer is None else tuple(sorted(renderer.passes.items())),
+            self.settling,
+            self.failing,
+        )
 
     def release(self) -> None:
         """Free what the renderer holds."""

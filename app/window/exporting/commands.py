@@ -5,7 +5,7 @@ from pathlib import Path
 
 from langflash_core.base.outputs import RGB, ROOM, Output
 
-from ..commands import Notify
+from ..commands import Command, Notify
 from ..dialogs import Dialog
 from ..scene import samples
 from ..state import State
@@ -55,13 +55,10 @@ class ShowExport:
 
 
 @dataclass(frozen=True)
-class Export:
+class Export(Command):
     """Do what the form says; asks first where a file would be replaced, unless `sure`."""
 
     sure: bool = False
-
-    def apply(self, state: State) -> State:
-        return state
 
 
 @dataclass(frozen=True)

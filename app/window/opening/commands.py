@@ -7,7 +7,7 @@ from langflash_core.errors import FilmError
 from langflash_core.images.settings import CHOOSING, PHOTO_LIMITS
 from langflash_core.images.strip import REPEAT, Choice, Still, Strip, choose, notes_on
 
-from ..commands import Notify, ShowDialog
+from ..commands import Command, Notify, ShowDialog
 from ..dialogs import Dialog
 from ..scene.drops import NOT_TYPED, Typed
 from ..scene.state import LOOKING_THROUGH, Job, Photo
@@ -16,16 +16,13 @@ from .state import NO_OPENING, Film, Folder, told_film
 
 
 @dataclass(frozen=True)
-class OpenFiles:
+class OpenFiles(Command):
     """Look for files: with the desktop's own dialog where there is one (the effects know), else with ours.
 
     merging: for a scene that is to be merged into the one on show.
     """
 
     merging: bool = False
-
-    def apply(self, state: State) -> State:
-        return state
 
 
 @dataclass(frozen=True)
@@ -97,14 +94,11 @@ class FolderUsed:
 
 
 @dataclass(frozen=True)
-class MorePictures:
+class MorePictures(Command):
     """These photos of a folder are still to be made small, if one is still there."""
 
     folder: Path
     paths: tuple[Path, ...]
-
-    def apply(self, state: State) -> State:
-        return state
 
 
 @dataclass(frozen=True)
@@ -121,11 +115,8 @@ class Choose:
 
 
 @dataclass(frozen=True)
-class Paste:
+class Paste(Command):
     """Open what the clipboard holds: paths, files or a picture."""
-
-    def apply(self, state: State) -> State:
-        return state
 
 
 # Films

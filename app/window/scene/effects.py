@@ -3,7 +3,6 @@
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
 from dataclasses import replace
-from pathlib import Path
 
 from langflash_core.base.colormaps import colour_bar
 from langflash_core.base.formats import COLOUR_MAPS
@@ -87,9 +86,9 @@ class SceneEffects(Effects):
             case AddPhotos(paths):
                 submit(MakeThumbnails(paths))
             case Reconstruct() if state.scene.photos:
-                photos, detail = state.scene.photos, state.preferences.detail
-                paths, fovs = tuple(p.path for p in photos), tuple(p.fov for p in photos)
-                submit(ReconstructPhotos(paths, fovs, detail, films_of(state), self._networks))
+                paths, fovs = state.scene.paths, tuple(photo.fov for photo in state.scene.photos)
+                detail, films = state.preferences.detail, films_of(state)
+                submit(ReconstructPhotos(paths, fovs, detail, films, self._networks))
             case OpenScene(path, edits, alone):
                 submit(LoadScene(path, edits, alone))
             case SaveScene(path) if state.scene.info is not None:
@@ -100,7 +99,7 @@ class SceneEffects(Effects):
             case CancelJob() | PauseJob():
                 self._end_job(state)
             case ChoosePair() if state.scene.choosing and not before.scene.choosing:
-                submit(FindPair(tuple(photo.path for photo in state.scene.photos)))
+                submit(FindPair(state.scene.paths))
             case SceneArrived(info, replaces=changed):
                 self._show(info, before.scene.info, changed, state)
             case Thinned(scene, share, thinned, around):
@@ -146,12 +145,13 @@ class SceneEffects(Effects):
         self._hands.cancel()
         job = state.scene.job
         if job is not None and job.pausable and not job.pausing:
-            self._hands.submit(DropWork(_paths(state)))
+            self._hands.submit(DropWork(state.scene.paths))
 
     def _look_for_work(self, before: State, state: State) -> None:
         """Other photos in the tray may be ones on which work was begun."""
-        if _paths(before) != _paths(state) and len(state.scene.photos) >= FEWEST and state.scene.job is None:
-            self._hands.submit(LookForWork(_paths(state)))
+        paths = state.scene.paths
+        if paths != before.scene.paths and len(paths) >= FEWEST and state.scene.job is None:
+            self._hands.submit(LookForWork(paths))
 
     def _go_on(self, command: Command, before: State, state: State) -> None:
         """Commands that stand for others."""
@@ -245,8 +245,3 @@ class SceneEffects(Effects):
             yield
         except LangFlashError as error:
             self._hands.perform(Notify(str(error)))
-
-
-def _paths(state: State) -> tuple[Path, ...]:
-    """Of the photos in the tray."""
-    return tuple(photo.path for photo in state.scene.photos)

@@ -241,17 +241,22 @@ class Showing:
     taken_out: TakenOut | None = None
 
     @property
+    def paths(self) -> tuple[Path, ...]:
+        """Of the photos in the tray."""
+        return tuple(photo.path for photo in self.photos)
+
+    @property
     def num_taken_out(self) -> int:
         """Photos that were taken out of the tray and can be put back: nothing was done to it since."""
         taken = self.taken_out
-        if taken is None or self.job is not None or {photo.path for photo in self.photos} != set(taken.left):
+        if taken is None or self.job is not None or {*self.paths} != {*taken.left}:
             return 0
         return len(taken.photos) - len(taken.left)
 
     @property
     def goes_on(self) -> bool:
         """Whether work on the photos in the tray goes on from where it was."""
-        return bool(self.unfinished) and tuple(photo.path for photo in self.photos) == self.unfinished
+        return bool(self.unfinished) and self.paths == self.unfinished
 
 
 NO_SCENE = Showing()

@@ -156,7 +156,7 @@ def test_a_scene_begins_without_the_targets_of_the_one_before(viewport) -> None:
     for _ in range(3):
         state = replace(state, now=state.now + 0.05)
         viewport.update(state, SIZE, touched=0.0)
-    view = viewport._made().canvas.view(viewport.picture_size)
+    view = viewport._made().canvas.view(viewport.stats().picture_size)
     viewport.set_scene(2, other)
     held = viewport._made().canvas.holds(view)
     for _ in range(3):
@@ -458,7 +458,7 @@ def test_what_a_phrase_does_not_mean_leaves_the_picture_and_no_splat_is_drawn(vi
         return narrowed, next(each for each in told if isinstance(each, Answered)), pixels.astype(int)
 
     _, _, plain = seen("armchair")
-    passes = dict(viewport.passes)
+    passes = dict(viewport.stats().passes)
     kept, _, red = seen("red armchair in front of the wall")
     gone, none, blue = seen("blue armchair")
     assert kept is not None and gone is not None and float(kept.relevance.max()) > 0.9
@@ -466,6 +466,6 @@ def test_what_a_phrase_does_not_mean_leaves_the_picture_and_no_splat_is_drawn(vi
     assert abs(red - plain).max() <= 1 and abs(blue - plain).max() > 50, "a rounding; colours of heat"
     again, _, whole = seen('"blue armchair"')
     assert again is None and abs(whole - blue).max() > 50
-    after = dict(viewport.passes)
+    after = dict(viewport.stats().passes)
     splatted = ("colour", "weights")
     assert [after.get(kind) for kind in splatted] == [passes.get(kind) for kind in splatted]
