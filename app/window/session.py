@@ -25,7 +25,7 @@ from .asking.effects import AskingEffects
 from .commands import Command, CopyText, Measured, Notify, OfScene, PictureDrawn, ShowPicture, Tick, apply
 from .drawing.values import BACKGROUND
 from .editing.effects import EditingEffects
-from .effects import Effects, Hands
+from .effects import Effects, Hands, LogEffects, RestEffects, TypedEffects
 from .events import Events
 from .exporting.effects import ExportingEffects
 from .filming.effects import FilmingEffects
@@ -34,7 +34,6 @@ from .inventory.effects import InventoryEffects
 from .kit import theme
 from .kit.look import Look
 from .kit.textures import Thumbnails
-from .log import LogEffects
 from .opening.effects import OpeningEffects
 from .recovery import preferences
 from .recovery.commands import Prefer
@@ -42,12 +41,10 @@ from .recovery.effects import RecoveryEffects
 from .recovery.keeper import Keeper
 from .recovery.preferences import Preferences
 from .recovery.remembering import RememberingEffects
-from .rest import RestEffects
 from .scene.commands import OpenPaths
 from .scene.effects import SceneEffects
 from .state import State
 from .touring.effects import TouringEffects
-from .typed import TypedEffects
 from .viewport import Viewport
 from .worker import Worker
 

@@ -152,16 +152,6 @@ class Viewport:
             self._before.release()
         self._before = None
 
-    def _begin_thinned(self, serial: int, scene: "Scene", thinned: "Thinned") -> None:
-        """Show a large scene, now that the share of it that moves is made."""
-        from .drawing.processor import ProcessorPicture
-
-        self._awaited = None
-        picture = ProcessorPicture(self._made(), serial, scene, self._notify, thinned)
-        self._begin(picture, scene)
-        if self._asked is not None:
-            picture.ask(*self._asked)
-
     def ask(self, keys: tuple[int, ...], query: "CompiledQuery | None", revision: int = 0) -> None:
         """Ask the prompts `keys`, in the order of `query`, compiled when `Asking.revision` was `revision`;
         None asks nothing."""
@@ -221,7 +211,13 @@ class Viewport:
         """
         awaited = self._awaited
         if awaited is not None and awaited[1] is scene and awaited[2].share == share:
-            self._begin_thinned(awaited[0], scene, thinned)
+            from .drawing.processor import ProcessorPicture
+
+            self._awaited = None
+            picture = ProcessorPicture(self._made(), awaited[0], scene, self._notify, thinned)
+            self._begin(picture, scene)
+            if self._asked is not None:
+                picture.ask(*self._asked)
         elif self.picture is not None:
             self.picture.easel.renderer.give_level(scene, share, thinned)
             self.picture.governor = self.picture.governor.with_share(share)

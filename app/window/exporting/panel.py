@@ -133,13 +133,13 @@ def _order(state: State, look: Look) -> list[do.Command]:
         widgets.muted(order)
         return []
     widgets.muted("As a command:")
-    _command_line(order.line, look)
+    _command_line(order.request.line, look)
     imgui.same_line()
     copied = widgets.quiet_button(f"{fa.ICON_FA_COPY}##line", "Copy the command line")
     for remark in written.remarks(state):
         widgets.muted(remark)
     widgets.gap(look.px(4))
-    return [do.CopyText(order.line)] if copied else []
+    return [do.CopyText(order.request.line)] if copied else []
 
 
 def _buttons(state: State, look: Look, confirmed: bool) -> list[do.Command]:

@@ -22,7 +22,7 @@ SURE = 0.95
 """From here on a thing is what it is called: `langflash_core.writing.inventory.words`, which loads torch."""
 _SIZE = (372.0, 560.0)  # design pixels, the height at most
 _LEAST = (300.0, 220.0)
-_BELOW, _MARGIN = 150.0, 12.0  # of axes and key frames, which are above; of the picture's border
+_BELOW = 150.0  # of axes and key frames, which are above
 _BAR = 46.0  # of how sure
 _ASIDE = 120.0  # how far a caption goes to be seen
 _NAME = "##name"
@@ -44,7 +44,7 @@ def draw(state: State, look: Look, place: ImVec2, size: ImVec2, above: ImVec2) -
     the picture's place without the strip of photos at its foot, whose buttons it does not cover."""
     if not state.listing.open:
         return []
-    corner, extent = _stands(look, place, size, above)
+    corner, extent = boxes.opens_at(place, size, above.y, look, _BELOW, _SIZE, _LEAST[1])
     imgui.set_next_window_pos(corner, imgui.Cond_.appearing)
     imgui.set_next_window_size(extent, imgui.Cond_.appearing)
     imgui.set_next_window_size_constraints(look.vec(*_LEAST), imgui.get_io().display_size)
@@ -59,18 +59,6 @@ def draw(state: State, look: Look, place: ImVec2, size: ImVec2, above: ImVec2) -
     imgui.end()
     imgui.pop_style_var()
     return issued if kept else [*issued, take.ShowInventory(False)]
-
-
-def _stands(look: Look, place: ImVec2, size: ImVec2, above: ImVec2) -> tuple[ImVec2, ImVec2]:
-    """Its corner and its size where it opens."""
-    aside = boxes.over_panel(place, size, look)
-    if aside is not None:
-        return aside
-    margin = look.px(_MARGIN)
-    top = place.y + look.px(_BELOW)
-    width = min(look.px(_SIZE[0]), size.x - 2 * margin)
-    height = min(look.px(_SIZE[1]), max(place.y + above.y - top - margin, look.px(_LEAST[1])))
-    return ImVec2(place.x + size.x - margin - width, top), ImVec2(width, height)
 
 
 def _body(state: State, look: Look, picture: tuple[float, float, float]) -> list[do.Command]:

@@ -12,7 +12,7 @@ from ..dialogs import Dialog
 from ..scene.drops import NOT_TYPED, Typed
 from ..scene.state import LOOKING_THROUGH, Job, Photo
 from ..state import State
-from .state import NO_OPENING, Film, Folder, told_film
+from .state import NO_OPENING, Film, Folder, Opening, told_film
 
 
 @dataclass(frozen=True)
@@ -46,13 +46,8 @@ class LookForPlace:
 
     def apply(self, state: State) -> State:
         wanted = state.exporting.form.path if state.dialog is Dialog.EXPORT else state.typed.text
-        asked = replace(
-            NO_OPENING,
-            asker=state.dialog,
-            name=Path(wanted).name,
-            pending=state.scene.pending,
-            film=state.opening.film,
-        )
+        pending, film = state.scene.pending, state.opening.film
+        asked = Opening(asker=state.dialog, name=Path(wanted).name, pending=pending, film=film)
         return replace(state, opening=asked)
 
 
@@ -146,8 +141,7 @@ class FilmRead:
             film = proposed(self.path, self.strip, min(room_for_frames(state), PHOTO_LIMITS.film_photos))
         except FilmError as error:
             return Notify(str(error)).apply(state)
-        state = state.with_opening(film=film)
-        return ShowDialog(Dialog.FILM).apply(state)
+        return ShowDialog(Dialog.FILM).apply(state.with_opening(film=film))
 
 
 @dataclass(frozen=True)
@@ -162,7 +156,8 @@ class ProposeFrames:
         if film is None:
             return state
         most = min(max(2, self.most), room_for_frames(state))
-        return _with_film(state, proposed(film.path, film.strip, most, most if self.exactly else 2))
+        chosen = proposed(film.path, film.strip, most, most if self.exactly else 2)
+        return state.with_opening(film=chosen)
 
 
 @dataclass(frozen=True)
@@ -179,7 +174,7 @@ class SwitchFrame:
         if len(chosen) > room_for_frames(state):
             text = f"At most {room_for_frames(state)} frames fit into one scene; exclude another one first."
             return Notify(text).apply(state)
-        return _with_film(state, replace(film, chosen=tuple(sorted(chosen))))
+        return state.with_opening(film=replace(film, chosen=tuple(sorted(chosen))))
 
 
 @dataclass(frozen=True)
@@ -211,11 +206,8 @@ def _reason(still: Still, choice: Choice, index: int) -> str:
         return "repeats" if still.why_not == REPEAT else "other_shots"
     if choice.until is not None and still.seconds > choice.until:
         return "beyond"
-    return (
-        "blurred"
-        if choice.relative[index] < CHOOSING.blurred or still.smear > CHOOSING.smeared
-        else "between"
-    )
+    blurred = choice.relative[index] < CHOOSING.blurred or still.smear > CHOOSING.smeared
+    return "blurred" if blurred else "between"
 
 
 def room_for_frames(state: State) -> int:
@@ -226,8 +218,9 @@ def room_for_frames(state: State) -> int:
 def films_of(state: State) -> tuple[dict, ...]:
     """Of the film that photos in the tray are frames of, what a scene's record says."""
     film = state.opening.film
-    of_film = film is not None and any(photo.path.parent == film.strip.folder for photo in state.scene.photos)
-    return (told_film(film),) if film is not None and of_film else ()
+    if film is None or film.strip.folder not in {path.parent for path in state.scene.paths}:
+        return ()
+    return (told_film(film),)
 
 
 def beside_frames(state: State) -> tuple[Photo, ...]:
@@ -238,7 +231,3 @@ def beside_frames(state: State) -> tuple[Photo, ...]:
     return tuple(
         photo for photo in state.scene.photos if film is None or photo.path.parent != film.strip.folder
     )
-
-
-def _with_film(state: State, film: Film) -> State:
-    return state.with_opening(film=film)

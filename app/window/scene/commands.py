@@ -382,12 +382,13 @@ class SaveFirst:
 
 @dataclass(frozen=True)
 class AskAboutDrop:
-    """Photos were dropped on a scene: do they belong to it?"""
+    """Photos were dropped on a scene: do they belong to it? Or a scene: is it to be opened, or merged?"""
 
-    photos: tuple[Path, ...]
+    paths: tuple[Path, ...]
+    dialog: Dialog
 
     def apply(self, state: State) -> State:
-        return replace(state.with_scene(dropped=self.photos), dialog=Dialog.DROP)
+        return replace(state.with_scene(dropped=self.paths), dialog=self.dialog)
 
 
 def try_out(photos: tuple[Path, ...]) -> Command:
@@ -400,16 +401,6 @@ def dropped(state: State, photos: tuple[Path, ...], new: bool) -> Command:
     wants that at once."""
     taken: tuple[Command, ...] = (*((SetPhotosAside(),) if new else ()), AddPhotos(photos))
     return Instead((*taken, Reconstruct())) if state.preferences.start_at_once else All(taken)
-
-
-@dataclass(frozen=True)
-class AskAboutScene:
-    """A scene was dropped on a scene: is it to be opened, or merged into it?"""
-
-    path: Path
-
-    def apply(self, state: State) -> State:
-        return replace(state.with_scene(dropped=(self.path,)), dialog=Dialog.DROP_SCENE)
 
 
 @dataclass(frozen=True)

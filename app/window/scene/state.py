@@ -210,10 +210,10 @@ class Showing:
     """The scene's half of the state: the tray, the scene on show, how it is looked at, the work on it.
 
     aside: photos of the scene on show while those of a new room are in the tray. choosing: the best pair is
-    being looked for. rooms: scenes that were on show before, the last one first. dropped: photos while it is
-    asked where they belong. pending: commands that wait for an answer about unsaved edits. view: of the photo
-    stood at, if any. hold: the hand on the picture. compare: where the photo begins, 0 to 1 across the
-    picture; None: not compared.
+    being looked for. rooms: scenes that were on show before, the last one first. dropped: photos, or a scene,
+    while it is asked where they belong. pending: commands that wait for an answer about unsaved edits. view:
+    of the photo stood at, if any. hold: the hand on the picture. compare: where the photo begins, 0 to 1
+    across the picture; None: not compared.
     unfinished: photos on which work was begun and kept. taken_out: what the tray had before.
     unhidden: the scene on show as it was before something in it was hidden for good, until that is saved;
     shown_by: files of scenes that show what was hidden in it by then. mute: the scene on show as it was

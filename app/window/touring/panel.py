@@ -19,7 +19,7 @@ from . import commands as tour
 
 _SIZE = (330.0, 400.0)  # design pixels, the height at most
 _BELOW = 150.0  # of the axes and the key frames, which are above
-_MARGIN, _BUTTON = 12.0, 30.0
+_BUTTON, _LEAST = 30.0, 120.0  # the second: of the height
 _FAINT = 0.35  # how much is seen of a note that is behind a surface
 _LETTERS = 40  # of a note that are shown in the picture
 
@@ -37,7 +37,7 @@ def draw(state: State, look: Look, place: ImVec2, size: ImVec2) -> list[do.Comma
     """The window over the picture's right side, or over the panel where that is narrow."""
     if not state.touring.open:
         return []
-    corner, extent = boxes.over_panel(place, size, look) or _over_picture(look, place, size)
+    corner, extent = boxes.opens_at(place, size, size.y, look, _BELOW, _SIZE, _LEAST)
     imgui.set_next_window_pos(corner, imgui.Cond_.appearing)
     imgui.set_next_window_size(extent, imgui.Cond_.appearing)
     imgui.push_style_var(imgui.StyleVar_.window_rounding, look.px(8))
@@ -56,14 +56,6 @@ def draw(state: State, look: Look, place: ImVec2, size: ImVec2) -> list[do.Comma
     imgui.end()
     imgui.pop_style_var()
     return issued if kept else [*issued, tour.ShowTour(False)]
-
-
-def _over_picture(look: Look, place: ImVec2, size: ImVec2) -> tuple[ImVec2, ImVec2]:
-    """Its corner and its size where it opens."""
-    top, margin = place.y + look.px(_BELOW), look.px(_MARGIN)
-    height = min(look.px(_SIZE[1]), max(place.y + size.y - top - margin, look.px(120)))
-    width = min(look.px(_SIZE[0]), size.x - 2 * margin)
-    return ImVec2(place.x + size.x - margin - width, top), ImVec2(width, height)
 
 
 def _bar(state: State, look: Look) -> list[do.Command]:

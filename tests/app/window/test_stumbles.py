@@ -20,7 +20,6 @@ from app.window.editing.panels import pointing as card_panel
 from app.window.editing.panels import ruler, tools
 from app.window.editing.state import Card, Editing, Reading, Tool
 from app.window.exporting import commands as export
-from app.window.exporting import order
 from app.window.exporting.state import Running
 from app.window.filming import commands as film
 from app.window.frame import dialogs, keys, layout
@@ -126,7 +125,8 @@ def test_a_double_click_walks_into_one_folder(items: Items) -> None:
     assert hands.of(opening.LookInto)[1:] == [opening.LookInto(Path("/home/Pictures/toys"))]
 
 
-def test_keys_walk_through_folders_and_choose_photos() -> None:
+def test_keys_walk_through_folders_and_open_what_the_space_bar_has_chosen() -> None:
+    """No way leads from the photos to the button by arrows alone that does not pass "Cancel"."""
     photos = (Path("/home/Pictures/a.png"), Path("/home/Pictures/b.png"))
     states = [browsing(Folder(Path("/home"), (Path("/home/Pictures"),)))]
     hands = Hands(lambda seen: browser.draw(states[-1], seen), bare=True)
@@ -142,7 +142,12 @@ def test_keys_walk_through_folders_and_choose_photos() -> None:
         states.append(browsing(Folder(Path("/home/Pictures"), (), photos)))
         hands.frames(4)
         hands.key(imgui.Key.space)
-    assert hands.of(opening.Choose) == [opening.Choose(photos[0])]
+        assert hands.of(opening.Choose) == [opening.Choose(photos[0])]
+        states.append(apply(states[-1], opening.Choose(photos[0])))
+        hands.key(imgui.Key.right_arrow)
+        hands.key(imgui.Key.enter)
+    assert hands.of(show.OpenPaths) == [show.OpenPaths(tuple(map(str, photos)))]
+    assert hands.of(ShowDialog) == []
 
 
 def test_a_card_is_asked_again_once_its_thing_has_another_name(items: Items) -> None:
@@ -160,28 +165,6 @@ def test_a_card_is_asked_again_once_its_thing_has_another_name(items: Items) -> 
         hands.key(imgui.Key.enter)
     assert hands.of(edit.RenameAtom) == [edit.RenameAtom(1, "armchair")]
     assert hands.of(point.Ask) == [point.Ask((300, 200))]
-
-
-def test_enter_opens_what_the_space_bar_has_chosen() -> None:
-    """No way leads from the photos to the button by arrows alone that does not pass "Cancel"."""
-    photos = (Path("/home/Pictures/a.png"), Path("/home/Pictures/b.png"))
-    states = [browsing(Folder(Path("/home/Pictures"), (), photos))]
-    hands = Hands(lambda seen: browser.draw(states[-1], seen), bare=True)
-    with context(SIZE):
-        imgui.get_io().config_flags |= imgui.ConfigFlags_.nav_enable_keyboard
-        hands.frames(4)
-        for _ in range(10):
-            hands.key(imgui.Key.down_arrow)
-            hands.key(imgui.Key.space)
-            if hands.of(opening.Choose):
-                break
-        taken = hands.of(opening.Choose)[0]
-        states.append(apply(states[-1], taken))
-        hands.key(imgui.Key.right_arrow)
-        hands.key(imgui.Key.enter)
-    assert taken == opening.Choose(photos[0])
-    assert hands.of(show.OpenPaths) == [show.OpenPaths(tuple(map(str, photos)))]
-    assert hands.of(ShowDialog) == []
 
 
 @pytest.mark.parametrize("asker", [Dialog.EXPORT, Dialog.SAVE])
@@ -322,22 +305,7 @@ def measuring() -> State:
     return state.with_editing(tool=Tool.RULER, ruler=spots)
 
 
-def test_the_rulers_line_is_below_its_field() -> None:
-    """On the picture, not before all panels."""
-    state, before = measuring(), list[int]()
-
-    def draw(seen: Look) -> list[Command]:
-        issued = ruler.draw(state, seen, PLACE, ROOM)
-        before.append(imgui.get_foreground_draw_list().vtx_buffer.size())
-        return issued
-
-    with context(SIZE):
-        Hands(draw).frames(4)
-        box("##ruler")  # is there
-    assert before[-1] == 0
-
-
-@pytest.mark.parametrize("mark", ["asked", "card", "region"])
+@pytest.mark.parametrize("mark", ["asked", "card", "region", "ruler"])
 def test_marks_on_the_picture_are_below_a_dialog(mark: str) -> None:
     """A dot of the place that was asked about shone through the list of scenes to merge."""
     state, before = replace(shown_scene(), dialog=Dialog.HELP), list[int]()
@@ -346,6 +314,7 @@ def test_marks_on_the_picture_are_below_a_dialog(mark: str) -> None:
         "asked": replace(state.editing, asked=place),
         "card": replace(state.editing, card=Card(Reading(place), ())),
         "region": replace(state.editing, tool=Tool.BOX, drag=path),
+        "ruler": measuring().editing,
     }
     shown = replace(look(), picture=SimpleNamespace(glo=1))  # pyright: ignore[reportArgumentType]
 
@@ -444,44 +413,24 @@ def test_a_dialog_stays_in_the_window() -> None:
             assert left >= 0 and top >= 0 and right <= SIZE[0] and bottom <= SIZE[1]
 
 
-def test_an_export_moves_nothing_in_the_panel(items: Items, monkeypatch) -> None:
+def test_an_export_that_begins_moves_nothing_in_the_panel_and_takes_no_keys(
+    items: Items, monkeypatch
+) -> None:
+    """Enter would stop it."""
     state = shown_scene()
     running = state.with_exporting(running=Running(Path("mask.png")))
     monkeypatch.setattr(layout.canvas, "draw", lambda state, look: [])  # needs OpenGL
     places = []
     with context(SIZE):
+        imgui.get_io().config_flags |= imgui.ConfigFlags_.nav_enable_keyboard
         for each in (state, running):
             hands = Hands(lambda seen, each=each: layout.draw_all(each, seen)[0])
             hands.frames(6)
             places.append(middle(items, "##text"))
         assert any(name.endswith("Stop the export") for name in items.now())
-    assert places[0] == places[1]
-
-
-def test_a_film_follows_the_key_frames_where_there_are_some() -> None:
-    state = after(shown_scene(), export.ShowExport())
-    state = after(state, export.EditForm(replace(state.exporting.form, what=outputs.VIDEO)))
-    assert order.way(state) == "photos"
-    state = after(state, film.AddKey(), film.AddKey())
-    assert len(state.keys) == 2 and order.way(state) == "keys"
-    state = after(state, export.EditForm(replace(state.exporting.form, way="orbit")))
-    assert order.way(state) == "orbit"
-
-
-def test_an_export_that_begins_takes_no_keys(monkeypatch) -> None:
-    """Enter would stop it."""
-    state = shown_scene()
-    running = state.with_exporting(running=Running(Path("mask.png")))
-    states = [state]
-    monkeypatch.setattr(layout.canvas, "draw", lambda state, look: [])  # needs OpenGL
-    hands = Hands(lambda seen: layout.draw_all(states[-1], seen)[0])
-    with context(SIZE):
-        imgui.get_io().config_flags |= imgui.ConfigFlags_.nav_enable_keyboard
-        hands.frames(6)
-        states.append(running)
-        hands.frames(6)
         window = imgui.get_current_context().nav_window
         assert window is None or window.name != "##export"
+    assert places[0] == places[1]
 
 
 def test_a_film_begins_with_a_button(items: Items) -> None:

@@ -14,20 +14,14 @@ from langflash_core.scene.edited import first_marks
 from langflash_core.scene.edits import History
 from langflash_core.scene.mask import Mask
 from langflash_core.scene.settings import TRUST
-from tests.app.window.scenes import VIEWS, shown_scene
+from tests.app.window.scenes import VIEWS, of_photos, shown_scene
 
 
 @pytest.fixture
 def state() -> State:
     """A scene that is known to be of two photos, seen from 40 degrees to the left of the first."""
-    shown = shown_scene()
-    assert shown.scene.info is not None
-    scene = shown.scene.info.scene
-    known = replace(scene, view_ids=torch.zeros(len(scene.gaussians), dtype=torch.int64))
-    aside = poses.orbit(VIEWS[0], math.radians(40), 0.0)
-    if aside.centre.x > 0:
-        aside = poses.orbit(VIEWS[0], math.radians(-40), 0.0)
-    return shown.with_scene(info=replace(shown.scene.info, scene=known), pose=aside)
+    left, right = (poses.orbit(VIEWS[0], math.radians(turn), 0.0) for turn in (40, -40))
+    return of_photos(shown_scene()).with_scene(pose=left if left.centre.x <= 0 else right)
 
 
 def test_how_far_the_photos_are_is_told_where_the_picture_fades(state: State) -> None:
