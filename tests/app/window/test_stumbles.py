@@ -40,12 +40,9 @@ from langflash_core.base import outputs
 from langflash_core.network.guided import GuidedDepthNet
 from langflash_core.network.pointmaps import PointMapNet
 from langflash_core.reconstruction.stages import STAGES
-from langflash_core.scene.edited import first_marks
-from langflash_core.scene.edits import History
-from langflash_core.scene.mask import Mask
 from tests.app.window.headless import box, context, frames, look
 from tests.app.window.items import Items
-from tests.app.window.scenes import after, shown_scene
+from tests.app.window.scenes import after, shown_scene, with_info
 
 SIZE = (1280, 800)
 PATIENCE = 60.0  # seconds
@@ -152,10 +149,8 @@ def test_keys_walk_through_folders_and_open_what_the_space_bar_has_chosen() -> N
 
 def test_a_card_is_asked_again_once_its_thing_has_another_name(items: Items) -> None:
     state = shown_scene()
-    assert state.scene.info is not None
-    history = History(first_marks(state.scene.info.scene))
     card = Card(Reading((300, 200), None, 1.0, ((1, 1.0),)), (("tv stand", 0.93),))
-    state = state.with_editing(history=history, card=card, names=(("a",),) * 3)
+    state = state.with_editing(card=card, names=(("a",),) * 3)
     hands = Hands(lambda seen: card_panel.draw(state, seen, PLACE, ROOM))
     with context(SIZE):
         hands.frames(4)
@@ -213,9 +208,7 @@ def test_the_kinds_of_export_are_where_they_were_when_the_dialog_opens_again(ite
 
 def test_buttons_of_a_selection_stay_as_it_grows(items: Items, monkeypatch) -> None:
     places = set()
-    state = shown_scene()
-    assert state.scene.info is not None
-    state = state.with_scene(info=replace(state.scene.info, num_gaussians=92_440))
+    state = with_info(shown_scene(), num_gaussians=92_440)
     for count in (1, 22, 333, 4_444, 92_440):
         monkeypatch.setattr(Editing, "num_selected", property(lambda editing, count=count: count))
         with context(SIZE):
@@ -281,21 +274,13 @@ def test_arrows_with_ctrl_lead_to_no_other_control(ctrl: bool) -> None:
 
 
 def test_a_colour_is_chosen_by_the_key_that_began() -> None:
-    state = shown_scene()
-    assert state.scene.info is not None
-    marks = replace(
-        first_marks(state.scene.info.scene), selected=Mask.first(len(state.scene.info.scene.gaussians), 500)
-    )
-    state = state.with_editing(history=History(marks))
-    entry = named("Recolour the selection")
-    begin = entry.make(state)
-    assert begin is not None
-    state = apply(state, begin)
-    assert state.editing.tint is not None
-    end = entry.make(state)
-    assert end is not None
-    state = apply(state, end)
-    assert state.editing.tint is None and state.editing.marks is not None
+    state, entry = after(shown_scene(), edit.SelectAll()), named("Recolour the selection")
+    for tinting in (True, False):
+        command = entry.make(state)
+        assert command is not None
+        state = apply(state, command)
+        assert (state.editing.tint is not None) == tinting
+    assert state.editing.marks is not None
     assert [type(change).__name__ for change in state.editing.marks.changes] == ["Recoloured"]
 
 

@@ -4,12 +4,10 @@ from dataclasses import replace
 from pathlib import Path
 
 import pytest
-from imgui_bundle import imgui
 
 from app.window.commands import ShowDialog, ShowPicture
 from app.window.dialogs import Dialog
-from app.window.frame import dialogs, table
-from app.window.kit import theme
+from app.window.frame import table
 from app.window.opening import commands as opening
 from app.window.opening import work
 from app.window.opening.effects import OpeningEffects
@@ -22,7 +20,6 @@ from app.window.state import State
 from langflash_core.errors import Cancelled, FilmError
 from langflash_core.images.settings import PHOTO_LIMITS
 from tests import films
-from tests.app.window import headless
 from tests.app.window.scene import test_rooms
 from tests.app.window.scenes import shown_scene
 
@@ -191,15 +188,6 @@ def test_films_are_found(tmp_path: Path, walk: Path) -> None:
     (tmp_path / "a.jpg").touch()
     assert sort_drop([tmp_path]).films == () and len(sort_drop([tmp_path]).photos) == 1
     assert [path.name for path in work.listed(tmp_path).films] == ["a.MOV"]
-
-
-def test_the_dialog_fits_and_switches(desk: Desk) -> None:
-    with headless.context((900, 600)):
-        theme.set_up(1.0)
-        headless.frames(lambda look: dialogs.draw(desk.state, look), headless.look())
-        box = headless.box(Dialog.FILM.value)
-        assert box[0] >= 0 and box[1] >= 0 and box[2] <= 900 and box[3] <= 600
-        assert imgui.is_popup_open("", imgui.PopupFlags_.any_popup_id | imgui.PopupFlags_.any_popup_level)
 
 
 def test_what_is_told_of_frames_adds_up_however_they_are_chosen(desk: Desk) -> None:
