@@ -17,6 +17,7 @@ from .dialogs import PROMPTS, RECIPES, Dialog
 from .editing.state import RECIPE_SUFFIX
 from .filming.state import Walk
 from .protocol import Command as Command
+from .protocol import Outward
 from .scene import samples
 from .scene.drops import There, Typed
 from .scene.state import FLIGHT_SECONDS
@@ -105,14 +106,14 @@ class Log:
 
 
 @dataclass(frozen=True)
-class CopyText(Command):
+class CopyText(Outward):
     """Put text on the clipboard (the session does)."""
 
     text: str
 
 
 @dataclass(frozen=True)
-class ShowPicture(Command):
+class ShowPicture(Outward):
     """Keep a small picture, (h, w, 3) uint8, for panels that ask for `key` (the session does)."""
 
     key: str
@@ -190,7 +191,7 @@ class Leave:
 
 
 @dataclass(frozen=True)
-class PictureDrawn(Command):
+class PictureDrawn(Outward):
     """A still picture is ready to be shown."""
 
 

@@ -7,7 +7,13 @@ if TYPE_CHECKING:
 
 
 class Command(Protocol):
-    """Anything with a pure change of state; here none, for what only effects act on."""
+    """Anything with a pure change of state."""
+
+    def apply(self, state: "State") -> "State": ...
+
+
+class Outward:
+    """A command that only effects act on."""
 
     def apply(self, state: "State") -> "State":
         return state

@@ -5,8 +5,9 @@ from pathlib import Path
 
 from langflash_core.base.outputs import RGB, ROOM, Output
 
-from ..commands import Command, Notify
+from ..commands import Notify
 from ..dialogs import Dialog
+from ..protocol import Outward
 from ..scene import samples
 from ..state import State
 from .state import ExportForm, Running, Target
@@ -55,7 +56,7 @@ class ShowExport:
 
 
 @dataclass(frozen=True)
-class Export(Command):
+class Export(Outward):
     """Do what the form says; asks first where a file would be replaced, unless `sure`."""
 
     sure: bool = False

@@ -112,13 +112,17 @@ def _narrowed(state: State, form: ExportForm, look: Look) -> ExportForm:
     what = form.what
     if what.takes_phrases and not what.needs_phrases:
         imgui.begin_disabled(not state.asking.asked)
-        form = replace(form, only_found=widgets.checkbox("Only what the phrases find", form.only_found)[1])
+        changed, only = widgets.checkbox("Only what the phrases find", form.only_found)
         imgui.end_disabled()
+        if changed:
+            form = replace(form, only_found=only)
     if what.splats:
         imgui.same_line(0, look.px(26))
         imgui.begin_disabled(state.exporting.selection is None)
-        form = replace(form, only_selected=widgets.checkbox("Only what is selected", form.only_selected)[1])
+        changed, only = widgets.checkbox("Only what is selected", form.only_selected)
         imgui.end_disabled()
+        if changed:
+            form = replace(form, only_selected=only)
     return form
 
 

@@ -43,13 +43,14 @@ def _top(corner: ImVec2, look: Look) -> float:
 def _bar(state: State, look: Look) -> list[do.Command]:
     issued: list[do.Command] = []
     imgui.push_style_var(imgui.StyleVar_.item_spacing, look.vec(4, 4))
-    count, playing = len(state.keys), state.filming.tour is not None
+    keys, playing = state.keys, state.filming.tour is not None
+    count = len(keys)
     icon, command = (fa.ICON_FA_STOP, film.StopTour()) if playing else (fa.ICON_FA_PLAY, film.Preview())
     tip = "Fly along the key frames  (J)"
     issued += widgets.press(f"{icon}##tour", command, tip, able=playing or count > 1)
     for place in range(min(count, _MOST_SHOWN)):
         imgui.same_line()
-        there, tip = camera.FlyTo(state.keys[place]), "Fly there; right-click removes it"
+        there, tip = camera.FlyTo(keys[place]), "Fly there; right-click removes it"
         issued += widgets.press(f"{place + 1}##key", there, tip)
         if imgui.is_item_clicked(imgui.MouseButton_.right):
             issued.append(film.RemoveKey(place))

@@ -7,8 +7,9 @@ from langflash_core.errors import FilmError
 from langflash_core.images.settings import CHOOSING, PHOTO_LIMITS
 from langflash_core.images.strip import REPEAT, Choice, Still, Strip, choose, notes_on
 
-from ..commands import Command, Notify, ShowDialog
+from ..commands import Notify, ShowDialog
 from ..dialogs import Dialog
+from ..protocol import Outward
 from ..scene.drops import NOT_TYPED, Typed
 from ..scene.state import LOOKING_THROUGH, Job, Photo
 from ..state import State
@@ -16,7 +17,7 @@ from .state import NO_OPENING, Film, Folder, Opening, told_film
 
 
 @dataclass(frozen=True)
-class OpenFiles(Command):
+class OpenFiles(Outward):
     """Look for files: with the desktop's own dialog where there is one (the effects know), else with ours.
 
     merging: for a scene that is to be merged into the one on show.
@@ -89,7 +90,7 @@ class FolderUsed:
 
 
 @dataclass(frozen=True)
-class MorePictures(Command):
+class MorePictures(Outward):
     """These photos of a folder are still to be made small, if one is still there."""
 
     folder: Path
@@ -110,7 +111,7 @@ class Choose:
 
 
 @dataclass(frozen=True)
-class Paste(Command):
+class Paste(Outward):
     """Open what the clipboard holds: paths, files or a picture."""
 
 

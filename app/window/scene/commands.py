@@ -14,6 +14,7 @@ from ..dialogs import Dialog
 from ..editing.state import fresh
 from ..filming.state import NO_FILMING
 from ..governor import Around
+from ..protocol import Outward
 from ..state import State
 from .memory import SceneMemory
 from .near import first_stand
@@ -258,7 +259,7 @@ class OpenPaths:
 
 
 @dataclass(frozen=True)
-class Loaded(Command):
+class Loaded(Outward):
     """The worker has loaded what drawing needs: while there is no scene, shaders can be compiled."""
 
 
@@ -333,7 +334,7 @@ def _rooms(state: State, coming: SceneInfo) -> tuple[Room, ...]:
 
 
 @dataclass(frozen=True)
-class Thinned(Command):
+class Thinned(Outward):
     """A share of the scene's Gaussians for a moving camera is made (scene/thin.py), of a huge scene around
     a place."""
 
@@ -344,7 +345,7 @@ class Thinned(Command):
 
 
 @dataclass(frozen=True)
-class GoToRoom(Command):
+class GoToRoom(Outward):
     """Back to the scene with this number, which was on show before."""
 
     serial: int

@@ -61,13 +61,14 @@ def draw(state: State, look: Look, place: ImVec2, size: ImVec2) -> list[do.Comma
 def _bar(state: State, look: Look) -> list[do.Command]:
     issued: list[do.Command] = []
     wide, playing = ImVec2(look.px(_BUTTON), 0), state.filming.tour is not None
+    there = bool(state.tour.stops)
     play, flight = (fa.ICON_FA_STOP, film.StopTour()) if playing else (fa.ICON_FA_PLAY, tour.Play())
     for icon, command, tip in (
         (fa.ICON_FA_BACKWARD_STEP, tour.Step(-1), "Previous stop  (PgUp)"),
         (play, flight, "Play the tour"),
         (fa.ICON_FA_FORWARD_STEP, tour.Step(1), "Next stop  (PgDn)"),
     ):
-        issued += widgets.press(f"{icon}##{tip}", command, tip, wide, able=bool(state.tour.stops))
+        issued += widgets.press(f"{icon}##{tip}", command, tip, wide, there)
         imgui.same_line(0, look.px(4))
     tip = "Add this view as the next stop, with the active phrase"
     issued += widgets.press(f"{fa.ICON_FA_PLUS}  Add this view", tour.AddStop(), tip, on=True)

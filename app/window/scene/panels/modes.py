@@ -28,7 +28,8 @@ def draw(state: State, look: Look, room: float) -> list[do.Command]:
     shown = _fitting(look, room)
     for mode in shown:
         tip, chosen = f"{mode.tip}{_key(mode)}", state.scene.mode is mode
-        issued += widgets.press(mode.label, camera.SetMode(mode), tip, on=chosen)
+        if widgets.press(mode.label, None, tip, on=chosen):
+            issued.append(camera.SetMode(mode))
         imgui.same_line()
     named = state.scene.mode not in shown
     label = f"{state.scene.mode.label if named else 'More'}  {fa.ICON_FA_CARET_DOWN}###menu"

@@ -95,8 +95,8 @@ def _in_space(state: State, look: Look) -> list[do.Command]:
     compare, tip = camera.Compare(None if on else 0.5), "Compare with the photo, when standing at one  (P)"
     issued += widgets.press(fa.ICON_FA_LEFT_RIGHT, compare, tip, size, able, on)
     on, tip = wanted.photos_in_space, "Show the photos' cameras in the scene  (K)"
-    cameras = keep.Prefer(replace(wanted, photos_in_space=not on))
-    issued += widgets.press(fa.ICON_FA_CAMERA, cameras, tip, size, on=on)
+    if widgets.press(fa.ICON_FA_CAMERA, None, tip, size, on=on):
+        issued.append(keep.Prefer(replace(wanted, photos_in_space=not on)))
     imgui.pop_style_var(2)
     imgui.end_group()
     return issued
