@@ -17,6 +17,7 @@ from .dialogs import PROMPTS, RECIPES, Dialog
 from .editing.state import RECIPE_SUFFIX
 from .filming.state import Walk
 from .protocol import Command as Command
+from .protocol import Outward
 from .scene import samples
 from .scene.drops import There, Typed
 from .scene.state import FLIGHT_SECONDS
@@ -105,24 +106,18 @@ class Log:
 
 
 @dataclass(frozen=True)
-class CopyText:
+class CopyText(Outward):
     """Put text on the clipboard (the session does)."""
 
     text: str
 
-    def apply(self, state: State) -> State:
-        return state
-
 
 @dataclass(frozen=True)
-class ShowPicture:
+class ShowPicture(Outward):
     """Keep a small picture, (h, w, 3) uint8, for panels that ask for `key` (the session does)."""
 
     key: str
     rgb: np.ndarray = field(compare=False, repr=False)
-
-    def apply(self, state: State) -> State:
-        return state
 
 
 @dataclass(frozen=True)
@@ -134,12 +129,15 @@ class ShowDialog:
     def apply(self, state: State) -> State:
         if self.which is Dialog.SAVE and state.scene.info is None:
             return Notify(NOTHING_TO_SAVE).apply(state)
-        path = str(_place_to_save(state)) if self.which is Dialog.SAVE else ""
-        if self.which in PROMPTS:
-            path = str(state.asking.prompts_path or Path.home() / f"my{PROMPTS_SUFFIX}")
-        if self.which in RECIPES:
-            path = str(state.editing.recipe_path or Path.home() / f"my{RECIPE_SUFFIX}")
-        return replace(state.with_scene(pending=()), dialog=self.which, typed=Typed(path), palette=NO_PALETTE)
+        path: Path | str = ""
+        if self.which is Dialog.SAVE and state.scene.info is not None:
+            path = state.scene.info.path or samples.beside(state.scene.photos)
+        elif self.which in PROMPTS:
+            path = state.asking.prompts_path or Path.home() / f"my{PROMPTS_SUFFIX}"
+        elif self.which in RECIPES:
+            path = state.editing.recipe_path or Path.home() / f"my{RECIPE_SUFFIX}"
+        typed = Typed(str(path))
+        return replace(state.with_scene(pending=()), dialog=self.which, typed=typed, palette=NO_PALETTE)
 
 
 @dataclass(frozen=True)
@@ -193,11 +191,8 @@ class Leave:
 
 
 @dataclass(frozen=True)
-class PictureDrawn:
+class PictureDrawn(Outward):
     """A still picture is ready to be shown."""
-
-    def apply(self, state: State) -> State:
-        return state
 
 
 @dataclass(frozen=True)
@@ -208,10 +203,3 @@ class Measured:
 
     def apply(self, state: State) -> State:
         return replace(state, stats=self.stats)
-
-
-def _place_to_save(state: State) -> Path:
-    """The scene's own file, or one beside its photos."""
-    if state.scene.info is not None and state.scene.info.path is not None:
-        return state.scene.info.path
-    return samples.beside(state.scene.photos)

@@ -49,9 +49,11 @@ class Events:
         glfw.set_scroll_callback(window, self._waking(backend.scroll_callback))
         glfw.set_window_size_callback(window, self._waking(backend.resize_callback))
         glfw.set_window_refresh_callback(window, self._waking(lambda _window: None))
-        glfw.set_window_focus_callback(window, self._waking(self._focused))
+        focused = lambda _window, has: backend.io.add_focus_event(bool(has))  # noqa: E731
+        glfw.set_window_focus_callback(window, self._waking(focused))
         glfw.set_window_close_callback(window, self._waking(self._asked_to_close))
-        self._drops = on_drop(window, self._waking(self._dropped))  # kept as long as glfw calls it
+        dropped = lambda paths: dispatch(OpenPaths(paths, dropped=True))  # noqa: E731
+        self._drops = on_drop(window, self._waking(dropped))  # kept as long as glfw calls it
         glfw.set_window_content_scale_callback(window, self._waking(lambda *_: rescale()))
         imgui.get_platform_io().platform_get_clipboard_text_fn = lambda _ctx: clipboard(window)
 
@@ -101,16 +103,10 @@ class Events:
         if not entered:
             self._backend.io.add_mouse_pos_event(-imgui.FLT_MAX, -imgui.FLT_MAX)
 
-    def _focused(self, _window, has: int) -> None:
-        self._backend.io.add_focus_event(bool(has))
-
     def _asked_to_close(self, window) -> None:
         """The close button asks before an unsaved scene is lost, as Ctrl+Q does."""
         glfw.set_window_should_close(window, False)
         self._dispatch(Leave())
-
-    def _dropped(self, paths: tuple[str, ...]) -> None:
-        self._dispatch(OpenPaths(paths, dropped=True))
 
 
 def _by_letter(key: int, scancode: int) -> int:

@@ -10,3 +10,10 @@ class Command(Protocol):
     """Anything with a pure change of state."""
 
     def apply(self, state: "State") -> "State": ...
+
+
+class Outward:
+    """A command that only effects act on."""
+
+    def apply(self, state: "State") -> "State":
+        return state

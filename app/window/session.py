@@ -25,7 +25,7 @@ from .asking.effects import AskingEffects
 from .commands import Command, CopyText, Measured, Notify, OfScene, PictureDrawn, ShowPicture, Tick, apply
 from .drawing.values import BACKGROUND
 from .editing.effects import EditingEffects
-from .effects import Effects, Hands
+from .effects import Effects, Hands, LogEffects, RestEffects, TypedEffects
 from .events import Events
 from .exporting.effects import ExportingEffects
 from .filming.effects import FilmingEffects
@@ -34,7 +34,6 @@ from .inventory.effects import InventoryEffects
 from .kit import theme
 from .kit.look import Look
 from .kit.textures import Thumbnails
-from .log import LogEffects
 from .opening.effects import OpeningEffects
 from .recovery import preferences
 from .recovery.commands import Prefer
@@ -42,12 +41,10 @@ from .recovery.effects import RecoveryEffects
 from .recovery.keeper import Keeper
 from .recovery.preferences import Preferences
 from .recovery.remembering import RememberingEffects
-from .rest import RestEffects
 from .scene.commands import OpenPaths
 from .scene.effects import SceneEffects
-from .state import State, Stats
+from .state import State
 from .touring.effects import TouringEffects
-from .typed import TypedEffects
 from .viewport import Viewport
 from .worker import Worker
 
@@ -108,9 +105,10 @@ class Session:
         recovery = RecoveryEffects(hands, keeper)
         remembering = RememberingEffects(hands, self._viewport, self._thumbnails)
         copied = lambda: desktop.clipboard(self._window, "surrogateescape")  # noqa: E731
+        entitle = lambda title: glfw.set_window_title(self._window, title)  # noqa: E731
         opening = OpeningEffects(hands, self._thumbnails, copied)
         self._effects = (
-            SceneEffects(hands, self._viewport, self._thumbnails, self._entitle),
+            SceneEffects(hands, self._viewport, self._thumbnails, entitle),
             opening,
             AskingEffects(hands, self._viewport),
             EditingEffects(hands, self._viewport),
@@ -176,7 +174,9 @@ class Session:
         """Release everything; may be called twice. After a crash the session is kept for the next one."""
         if self._closed:
             return
-        self._remember_window()
+        wanted = desktop.remembering(self._window, self.state.preferences)
+        if wanted != self.state.preferences:
+            self._perform(Prefer(wanted))
         self._closed = True
         self._worker.stop()
         for effects in self._effects:
@@ -199,11 +199,6 @@ class Session:
         """Queue a command from any thread."""
         self.dispatch(command)
         glfw.post_empty_event()
-
-    def _remember_window(self) -> None:
-        wanted = desktop.remembering(self._window, self.state.preferences)
-        if wanted != self.state.preferences:
-            self._perform(Prefer(wanted))
 
     # The loop
 
@@ -250,7 +245,8 @@ class Session:
         """Returns the seconds that drawing the scene took."""
         start = time.perf_counter()
         self._awake = max(self._awake - 1, 0)
-        for command in (Tick(now), *self._take()):
+        taken, self._inbox = self._inbox, []
+        for command in (Tick(now), *taken):
             self._perform(command)
         drawing = self._update_picture()
         self._backend.process_inputs()
@@ -267,10 +263,6 @@ class Session:
             self._perform(command)
         return drawing
 
-    def _take(self) -> list[Command]:
-        taken, self._inbox = self._inbox, []
-        return taken
-
     def _update_picture(self) -> float:
         """Returns the seconds that drawing took."""
         began = time.perf_counter()
@@ -284,17 +276,7 @@ class Session:
         with self._living():
             for effects in self._effects:
                 effects.after_picture(self.state)
-        stats = Stats(
-            self._frame_seconds,
-            self._viewport.picture_seconds,
-            self._viewport.picture_size,
-            self._renderer_name,
-            self._viewport.depth_range,
-            self._viewport.passes,
-            self._viewport.settling,
-            self._viewport.failing,
-        )
-        self._perform(Measured(stats))
+        self._perform(Measured(self._viewport.stats(self._frame_seconds, self._renderer_name)))
         return drawing
 
     def _present(self) -> None:
@@ -346,9 +328,6 @@ class Session:
                 yield
         except LangFlashError as error:
             self._perform(Notify(str(error)))
-
-    def _entitle(self, title: str) -> None:
-        glfw.set_window_title(self._window, title)
 
     def _rescale(self) -> None:
         """The window has come to another screen."""

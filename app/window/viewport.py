@@ -26,7 +26,7 @@ from .drawing.values import Stand, View
 from .editing.state import Point, Reading
 from .governor import Around, Governor
 from .scene.memory import SceneMemory
-from .state import State
+from .state import State, Stats
 
 if TYPE_CHECKING:
     from torch import Tensor
@@ -152,16 +152,6 @@ class Viewport:
             self._before.release()
         self._before = None
 
-    def _begin_thinned(self, serial: int, scene: "Scene", thinned: "Thinned") -> None:
-        """Show a large scene, now that the share of it that moves is made."""
-        from .drawing.processor import ProcessorPicture
-
-        self._awaited = None
-        picture = ProcessorPicture(self._made(), serial, scene, self._notify, thinned)
-        self._begin(picture, scene)
-        if self._asked is not None:
-            picture.ask(*self._asked)
-
     def ask(self, keys: tuple[int, ...], query: "CompiledQuery | None", revision: int = 0) -> None:
         """Ask the prompts `keys`, in the order of `query`, compiled when `Asking.revision` was `revision`;
         None asks nothing."""
@@ -221,7 +211,13 @@ class Viewport:
         """
         awaited = self._awaited
         if awaited is not None and awaited[1] is scene and awaited[2].share == share:
-            self._begin_thinned(awaited[0], scene, thinned)
+            from .drawing.processor import ProcessorPicture
+
+            self._awaited = None
+            picture = ProcessorPicture(self._made(), awaited[0], scene, self._notify, thinned)
+            self._begin(picture, scene)
+            if self._asked is not None:
+                picture.ask(*self._asked)
         elif self.picture is not None:
             self.picture.easel.renderer.give_level(scene, share, thinned)
             self.picture.governor = self.picture.governor.with_share(share)
@@ -320,25 +316,19 @@ class Viewport:
         """Whether the finer picture could not be drawn; it is tried again."""
         return self.picture is not None and self.picture.failing
 
-    @property
-    def passes(self) -> tuple[tuple[str, int], ...]:
-        """Passes run so far, by kind."""
-        return () if self._renderer is None else tuple(sorted(self._renderer.passes.items()))
-
-    @property
-    def depth_range(self) -> tuple[float, float]:
-        """Depths of the first and the last colour of the depth picture, scene units."""
-        return (0.0, 1.0) if self._renderer is None else self._renderer.depth_range
-
-    @property
-    def picture_seconds(self) -> float:
-        """That the picture on show took."""
-        return 0.0 if self.picture is None else self.picture.easel.seconds
-
-    @property
-    def picture_size(self) -> tuple[int, int]:
-        """Of the picture on show, its own pixels."""
-        return (0, 0) if self.picture is None else self.picture.easel.size
+    def stats(self, frame_seconds: float = 0.0, card: str = "") -> Stats:
+        """Figures of the picture on show, beside these of the frame and the graphics device."""
+        easel, renderer = None if self.picture is None else self.picture.easel, self._renderer
+        return Stats(
+            frame_seconds,
+            0.0 if easel is None else easel.seconds,
+            (0, 0) if easel is None else easel.size,
+            card,
+            (0.0, 1.0) if renderer is None else renderer.depth_range,
+            () if renderer is None else tuple(sorted(renderer.passes.items())),
+            self.settling,
+            self.failing,
+        )
 
     def release(self) -> None:
         """Free what the renderer holds."""

@@ -220,13 +220,8 @@ def _link_torch() -> None:
 
 def _import_ahead(name: str) -> None:
     """Import what would be waited for later, while nobody waits."""
-    from langflash_core.base.torchvision_fix import ensure_torchvision
-
     try:
-        if name == "torchvision":
-            ensure_torchvision()
-        else:
-            import_module(name)
+        import_module(name)
     except Exception:  # who needs it will say so
         log.debug("%s cannot be imported", name, exc_info=True)
     # What modules hold stays for good. The collector, which stops every thread, need not look at it

@@ -7,6 +7,7 @@ from langflash_core.base.outputs import RGB, ROOM, Output
 
 from ..commands import Notify
 from ..dialogs import Dialog
+from ..protocol import Outward
 from ..scene import samples
 from ..state import State
 from .state import ExportForm, Running, Target
@@ -55,13 +56,10 @@ class ShowExport:
 
 
 @dataclass(frozen=True)
-class Export:
+class Export(Outward):
     """Do what the form says; asks first where a file would be replaced, unless `sure`."""
 
     sure: bool = False
-
-    def apply(self, state: State) -> State:
-        return state
 
 
 @dataclass(frozen=True)

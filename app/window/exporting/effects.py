@@ -36,7 +36,10 @@ class ExportingEffects(Effects):
     def __init__(self, hands: Hands, keeper: Keeper) -> None:
         self._hands = hands
         self._keeper = keeper
-        self._exporter = Exporter(self._progressed, self._ended)
+        self._exporter = Exporter(
+            lambda *said: hands.dispatch(ExportProgressed(*said)),
+            lambda *told: hands.dispatch(ExportEnded(*told)),
+        )
         self._waits = False  # for a copy
         self._ready: set[Path] = set()  # copies that are complete
 
@@ -109,23 +112,17 @@ class ExportingEffects(Effects):
         except OSError as error:
             perform(Notify(f"The export cannot be started: {error.strerror or error}."))
         else:
-            perform(ExportBegan(wanted.target))
+            perform(ExportBegan(wanted.request.output))
 
     def _start(self, wanted: Order, state: State, replaces: bool) -> None:
         """Raises:
         LangFlashError: the folder or the camera file cannot be written.
         OSError: the process cannot be started.
         """
-        make_folder(wanted.target.parent)
+        make_folder(wanted.request.output.parent)
         if wanted.camera_file is not None:
             size = pixels(state.exporting.form.side, shape(state))
             keys = state.keys if state.exporting.form.what.moves else ()
             content = keys_json(keys, *size) if keys else camera_json(state.scene.pose, *size)
             write_atomically(wanted.camera_file, content)
         self._exporter.start(replace(wanted.request, replace=replaces).words())
-
-    def _progressed(self, stage: str, fraction: float) -> None:
-        self._hands.dispatch(ExportProgressed(stage, fraction))
-
-    def _ended(self, code: int, said: str, error: str) -> None:
-        self._hands.dispatch(ExportEnded(code, said, error))

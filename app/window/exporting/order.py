@@ -26,21 +26,6 @@ class Order:
     camera_file: Path | None = None
     files: tuple[Path, ...] = ()
 
-    @property
-    def target(self) -> Path:
-        """The file, or folder, that is named."""
-        return self.request.output
-
-    @property
-    def words(self) -> list[str]:
-        """The command that does it, after `langflash`."""
-        return self.request.words()
-
-    @property
-    def line(self) -> str:
-        """The command, to paste into a shell."""
-        return self.request.line
-
 
 def order(state: State) -> Order | str:
     """What the form says as it stands, or a sentence that says what is missing."""
@@ -50,11 +35,12 @@ def order(state: State) -> Order | str:
     phrases, problem = _phrases(state)
     if problem:
         return problem
-    if state.exporting.form.what.moves and way(state) == "keys" and len(state.keys) < 2:
+    form = state.exporting.form
+    what, goes = form.what, way(state) if form.what.moves else ""
+    if goes == "keys" and len(state.keys) < 2:
         return "A film along key frames needs two of them; fly somewhere and add one (M)."
-    if state.exporting.form.what.moves and way(state) == "tour" and not state.tour.stops:
+    if goes == "tour" and not state.tour.stops:
         return "A film along the tour needs a stop; fly somewhere and add one in the tour's panel."
-    what, form = state.exporting.form.what, state.exporting.form
     camera_file = _camera_file(state, target)
     request = ExportRequest(
         target,

@@ -13,6 +13,7 @@ from ..dialogs import Dialog
 from ..filming.state import WAYS
 from ..kit import theme, widgets
 from ..kit.look import Look
+from ..kit.widgets import Answer
 from ..opening import commands as opening
 from ..scene.near import photos_known
 from ..state import State
@@ -63,12 +64,8 @@ def _kinds(form: ExportForm, look: Look) -> ExportForm:
     for index, what in enumerate(ROOM if form.what in ROOM else OFFERED):
         if index % COLUMNS:
             imgui.same_line()
-        size = ImVec2(width, 0)
-        pressed = (
-            widgets.primary_button(what.label, size) if what is form.what else imgui.button(what.label, size)
-        )
-        if pressed:
-            form = replace(form, what=what)
+        for chosen in widgets.press(what.label, what, size=ImVec2(width, 0), on=what is form.what):
+            form = replace(form, what=chosen)
     return form
 
 
@@ -136,12 +133,13 @@ def _order(state: State, look: Look) -> list[do.Command]:
         widgets.muted(order)
         return []
     widgets.muted("As a command:")
-    _command_line(order.line, look)
-    issued = _copy(order.line)
+    _command_line(order.request.line, look)
+    imgui.same_line()
+    copied = widgets.quiet_button(f"{fa.ICON_FA_COPY}##line", "Copy the command line")
     for remark in written.remarks(state):
         widgets.muted(remark)
     widgets.gap(look.px(4))
-    return issued
+    return [do.CopyText(order.request.line)] if copied else []
 
 
 def _buttons(state: State, look: Look, confirmed: bool) -> list[do.Command]:
@@ -153,8 +151,7 @@ def _buttons(state: State, look: Look, confirmed: bool) -> list[do.Command]:
         issued.append(export.Export())
     imgui.end_disabled()
     imgui.same_line()
-    if imgui.button("Close", look.vec(120, 0)):
-        issued.append(do.ShowDialog(None))
+    issued += widgets.press("Close", do.ShowDialog(None), size=look.vec(120, 0))
     if busy:
         imgui.same_line()
         imgui.text_colored(theme.MUTED, "an export is running")
@@ -171,13 +168,11 @@ def draw_replacing(state: State, look: Look) -> list[do.Command]:
     if len(there) > _NAMED:
         widgets.muted(f"and {len(there) - _NAMED} more")
     widgets.gap(look.px(4))
-    issued: list[do.Command] = []
-    if widgets.default_button("Replace it" if alone else "Replace them", look.vec(140, 0)):
-        issued.append(export.Export(sure=True))
-    imgui.same_line()
-    if imgui.button("Choose another name", look.vec(190, 0)):
-        issued.append(do.ShowDialog(Dialog.EXPORT))
-    return issued
+    return widgets.answers(
+        look,
+        Answer("Replace it" if alone else "Replace them", 140, export.Export(sure=True)),
+        Answer("Choose another name", 190, do.ShowDialog(Dialog.EXPORT)),
+    )
 
 
 def _command_line(line: str, look: Look) -> None:
@@ -195,12 +190,6 @@ def _command_line(line: str, look: Look) -> None:
     imgui.dummy(ImVec2(width, extent.y + 2 * padding))
 
 
-def _copy(line: str) -> list[do.Command]:
-    imgui.same_line()
-    pressed = widgets.quiet_button(f"{fa.ICON_FA_COPY}##line", "Copy the command line")
-    return [do.CopyText(line)] if pressed else []
-
-
 def draw_progress(state: State, look: Look) -> list[do.Command]:
     """The export under way, in a window of its own, `PROGRESS` high; nothing without one."""
     now = state.exporting.running
@@ -215,7 +204,5 @@ def draw_progress(state: State, look: Look) -> list[do.Command]:
         widgets.at_right_edge(stage)
     fraction = now.fraction if now.fraction >= 0 else -0.6 * state.now
     imgui.progress_bar(fraction, ImVec2(-1, look.px(8)), "")
-    imgui.begin_disabled(now.cancelling)
-    pressed = imgui.button(f"{fa.ICON_FA_STOP}  Stop the export", ImVec2(-1, 0))
-    imgui.end_disabled()
-    return [export.CancelExport()] if pressed else []
+    stop, wide = f"{fa.ICON_FA_STOP}  Stop the export", ImVec2(-1, 0)
+    return widgets.press(stop, export.CancelExport(), size=wide, able=not now.cancelling)

@@ -43,29 +43,24 @@ def _top(corner: ImVec2, look: Look) -> float:
 def _bar(state: State, look: Look) -> list[do.Command]:
     issued: list[do.Command] = []
     imgui.push_style_var(imgui.StyleVar_.item_spacing, look.vec(4, 4))
-    count = len(state.keys)
-    imgui.begin_disabled(count < 2 and state.filming.tour is None)
-    playing = state.filming.tour is not None
-    if imgui.button(f"{fa.ICON_FA_STOP if playing else fa.ICON_FA_PLAY}##tour"):
-        issued.append(film.StopTour() if playing else film.Preview())
-    imgui.end_disabled()
-    widgets.tooltip("Fly along the key frames  (J)")
+    keys, playing = state.keys, state.filming.tour is not None
+    count = len(keys)
+    icon, command = (fa.ICON_FA_STOP, film.StopTour()) if playing else (fa.ICON_FA_PLAY, film.Preview())
+    tip = "Fly along the key frames  (J)"
+    issued += widgets.press(f"{icon}##tour", command, tip, able=playing or count > 1)
     for place in range(min(count, _MOST_SHOWN)):
         imgui.same_line()
-        if imgui.button(f"{place + 1}##key"):
-            issued.append(camera.FlyTo(state.keys[place]))
-        widgets.tooltip("Fly there; right-click removes it")
+        there, tip = camera.FlyTo(keys[place]), "Fly there; right-click removes it"
+        issued += widgets.press(f"{place + 1}##key", there, tip)
         if imgui.is_item_clicked(imgui.MouseButton_.right):
             issued.append(film.RemoveKey(place))
     if count > _MOST_SHOWN:
         imgui.same_line()
         imgui.text_colored(theme.MUTED, f"+{count - _MOST_SHOWN}")
     imgui.same_line()
-    if imgui.button(f"{fa.ICON_FA_PLUS}##key"):
-        issued.append(film.AddKey())
-    widgets.tooltip("Add this view as a key frame  (M)")
+    issued += widgets.press(f"{fa.ICON_FA_PLUS}##key", film.AddKey(), "Add this view as a key frame  (M)")
     imgui.same_line()
-    if widgets.quiet_button(f"{fa.ICON_FA_TRASH}##keys", "Remove all key frames"):
-        issued.append(film.ClearKeys())
+    tip = "Remove all key frames"
+    issued += widgets.press(f"{fa.ICON_FA_TRASH}##keys", film.ClearKeys(), tip, quiet=True)
     imgui.pop_style_var()
     return issued

@@ -15,6 +15,7 @@ from ..exporting import commands as export
 from ..exporting import panel as export_panel
 from ..kit import theme, widgets
 from ..kit.look import Look
+from ..kit.widgets import Answer
 from ..opening import commands as opening
 from ..opening.panels import browser, strip
 from ..recovery import panels as recovery_panels
@@ -121,12 +122,14 @@ def _body(dialog: Dialog) -> Callable[[State, Look], list[do.Command]]:
         Dialog.PLACE: browser.draw,
         Dialog.FILM: strip.draw,
         Dialog.UNSAVED: rooms.draw_unsaved,
-        Dialog.SAVE_PROMPTS: _saving("Save as", ask.SavePrompts),
-        Dialog.LOAD_PROMPTS: _loading(
-            "A set of phrases (.prompts.json); it replaces the current ones", ask.LoadPrompts
+        Dialog.SAVE_PROMPTS: _file("Save as", "Save", ask.SavePrompts),
+        Dialog.LOAD_PROMPTS: _file(
+            "A set of phrases (.prompts.json); it replaces the current ones", "Load", ask.LoadPrompts
         ),
-        Dialog.SAVE_RECIPE: _saving("Save as", clean.SaveRecipe),
-        Dialog.LOAD_RECIPE: _loading("A recipe (.json); it replaces the current rules", clean.LoadRecipe),
+        Dialog.SAVE_RECIPE: _file("Save as", "Save", clean.SaveRecipe),
+        Dialog.LOAD_RECIPE: _file(
+            "A recipe (.json); it replaces the current rules", "Load", clean.LoadRecipe
+        ),
         Dialog.EXPORT: export_panel.draw,
         Dialog.REPLACE: export_panel.draw_replacing,
         Dialog.SETTINGS: recovery_panels.draw_settings,
@@ -149,39 +152,30 @@ def _save(state: State, look: Look) -> list[do.Command]:
     return issued
 
 
-def _saving(label: str, make: Callable[[Path], do.Command]) -> Callable[[State, Look], list[do.Command]]:
-    """Asks for a file to write."""
-    return lambda state, look: _file(state, look, label, _verb(state), make)
-
-
-def _loading(label: str, make: Callable[[Path], do.Command]) -> Callable[[State, Look], list[do.Command]]:
-    """Asks for a file to read."""
-    return lambda state, look: _file(state, look, label, "Load", make)
-
-
-def _verb(state: State) -> str:
-    return "Replace" if state.typed.there is There.FILE else "Save"
-
-
 def _file(
-    state: State, look: Look, label: str, verb: str, make: Callable[[Path], do.Command]
-) -> list[do.Command]:
-    """A path, and the button that does something with it."""
-    issued, confirmed = _path_field(state, label)
-    text = state.typed.text.strip()
-    imgui.begin_disabled(not text)
-    pressed = widgets.default_button(verb, look.vec(120, 0), confirmed)
-    imgui.end_disabled()
-    issued += _cancel(look)
-    if text and pressed:
-        issued.append(make(typed_path(text)))
-    return issued
+    label: str, verb: str, make: Callable[[Path], do.Command]
+) -> Callable[[State, Look], list[do.Command]]:
+    """Asks for a path, with the button that does something with it."""
+
+    def draw(state: State, look: Look) -> list[do.Command]:
+        issued, confirmed = _path_field(state, label)
+        text = state.typed.text.strip()
+        imgui.begin_disabled(not text)
+        replaces = verb == "Save" and state.typed.there is There.FILE
+        pressed = widgets.default_button("Replace" if replaces else verb, look.vec(120, 0), confirmed)
+        imgui.end_disabled()
+        issued += _cancel(look)
+        if text and pressed:
+            issued.append(make(typed_path(text)))
+        return issued
+
+    return draw
 
 
 def _cancel(look: Look) -> list[do.Command]:
     """Beside the button that does it."""
     imgui.same_line()
-    return [do.ShowDialog(None)] if imgui.button("Cancel", look.vec(110, 0)) else []
+    return widgets.press("Cancel", do.ShowDialog(None), size=look.vec(110, 0))
 
 
 def _path_field(state: State, label: str, place: bool = False) -> tuple[list[do.Command], bool]:
@@ -218,20 +212,15 @@ def _help(state: State, look: Look) -> list[do.Command]:
 
 def _scroll_by_keys() -> None:
     """Where there is nothing that the keys could go to, ImGui scrolls nothing either."""
-    line, page = 3 * imgui.get_text_line_height(), 0.9 * imgui.get_window_height()
-    steps = (
-        (imgui.Key.down_arrow, line),
-        (imgui.Key.page_down, page),
-        (imgui.Key.end, imgui.get_scroll_max_y()),
-    )
-    back = (
-        (imgui.Key.up_arrow, -line),
-        (imgui.Key.page_up, -page),
-        (imgui.Key.home, -imgui.get_scroll_max_y()),
-    )
-    moved = sum(step for key, step in (*steps, *back) if imgui.is_key_pressed(key))
+    most, moved = imgui.get_scroll_max_y(), 0.0
+    for down, up, step in (
+        (imgui.Key.down_arrow, imgui.Key.up_arrow, 3 * imgui.get_text_line_height()),
+        (imgui.Key.page_down, imgui.Key.page_up, 0.9 * imgui.get_window_height()),
+        (imgui.Key.end, imgui.Key.home, most),
+    ):
+        moved += step * (imgui.is_key_pressed(down) - imgui.is_key_pressed(up))
     if moved:
-        imgui.set_scroll_y(min(max(imgui.get_scroll_y() + moved, 0.0), imgui.get_scroll_max_y()))
+        imgui.set_scroll_y(min(max(imgui.get_scroll_y() + moved, 0.0), most))
 
 
 def help_rows(group: str | None) -> list[tuple[str, str]]:
@@ -241,14 +230,13 @@ def help_rows(group: str | None) -> list[tuple[str, str]]:
     rows = []
     keyed = (entry for entry in table.ENTRIES if entry.group == group and entry.keys)
     for family, alike in groupby(keyed, lambda each: each.name.partition(": ")[0]):
-        first, *others = alike
-        if others:
-            meaning = _meaning(family, [entry.name for entry in (first, *others)])
-            rows += [
-                (_together(keys), meaning) for keys in zip(*(e.keys for e in (first, *others)), strict=True)
-            ]
+        entries = list(alike)
+        if len(entries) == 1:
+            rows.append((", ".join(map(str, entries[0].keys)), entries[0].name))
         else:
-            rows.append((", ".join(map(str, first.keys)), first.name))
+            meaning = _meaning(family, [entry.name for entry in entries])
+            kinds = zip(*(entry.keys for entry in entries), strict=True)
+            rows += [(_together(keys), meaning) for keys in kinds]
     return rows
 
 
@@ -285,27 +273,20 @@ def _help_group(group: str | None, look: Look, room: float) -> None:
 
 
 def _leave(state: State, look: Look) -> list[do.Command]:
-    info, export, issued = state.scene.info, state.exporting.running, list[do.Command]()
+    info, export = state.scene.info, state.exporting.running
+    stay, leave = do.ShowDialog(None), do.Leave(sure=True)
     if export is not None:
         imgui.text_wrapped(f"{export.target.name} is still being written; quitting drops it.")
     if export is not None and not do.unsaved(state):
-        if widgets.default_button("Wait for it", look.vec(140, 0)):
-            issued.append(do.ShowDialog(None))
-        widgets.beside(look.px(180))
-        if imgui.button("Quit without it", look.vec(180, 0)):
-            issued.append(do.Leave(sure=True))
-        return issued
+        return widgets.answers(look, Answer("Wait for it", 140, stay), Answer("Quit without it", 180, leave))
     lost = "The scene is" if info is None or info.path is None else f"The edits of {info.name} are"
     imgui.text_wrapped(f"{lost} not saved.")
-    if widgets.default_button("Save and quit", look.vec(140, 0)):
-        issued.append(show.SaveFirst())
-    widgets.beside(look.px(180))
-    if imgui.button("Quit without saving", look.vec(180, 0)):
-        issued.append(do.Leave(sure=True))
-    widgets.beside(look.px(110))
-    if imgui.button("Cancel", look.vec(110, 0)):
-        issued.append(do.ShowDialog(None))
-    return issued
+    return widgets.answers(
+        look,
+        Answer("Save and quit", 140, show.SaveFirst()),
+        Answer("Quit without saving", 180, leave),
+        Answer("Cancel", 110, stay),
+    )
 
 
 def _log(state: State, look: Look) -> list[do.Command]:

@@ -109,8 +109,7 @@ def recent(state: State) -> Iterable[Entry]:
 def sample_photos() -> Iterable[Entry]:
     """Pairs that come with the program, each a room of its own."""
     for label, photos in samples.pairs():
-        trying = show.Instead((show.SetPhotosAside(), show.AddPhotos(photos), show.Reconstruct()))
-        yield Entry(label, "Sample photos", _always(trying))
+        yield Entry(label, "Sample photos", _always(show.try_out(photos)))
 
 
 def _plain(name: str) -> tuple[Chord, ...]:
@@ -125,9 +124,14 @@ def _always(command: do.Command) -> Callable[[State], do.Command | None]:
     return lambda state: command
 
 
-def _shown(command: do.Command) -> Callable[[State], do.Command | None]:
+def _made(make: Callable[[State], do.Command]) -> Callable[[State], do.Command | None]:
     """Once there is a scene."""
-    return lambda state: command if state.scene.info is not None else None
+    return lambda state: make(state) if state.scene.info is not None else None
+
+
+def _shown(command: do.Command) -> Callable[[State], do.Command | None]:
+    """Once there is a scene, the same for all."""
+    return _made(lambda _: command)
 
 
 def _selected(command: do.Command) -> Callable[[State], do.Command | None]:
@@ -141,10 +145,8 @@ def _files() -> Iterable[Entry]:
     yield Entry("Open ...", group, looking, _ctrl("o"), fa.ICON_FA_FOLDER_OPEN, in_fields=True)
     yield Entry("Frames of the film ...", group, _frames, icon=fa.ICON_FA_FILM)
     yield Entry("Paste photos", group, _always(opening.Paste()), _ctrl("v"), fa.ICON_FA_PASTE)
-    yield Entry(
-        "Save ...", group, _shown(dialog(Dialog.SAVE)), _ctrl("s"), fa.ICON_FA_FLOPPY_DISK, in_fields=True
-    )
-    exporting = fa.ICON_FA_FILE_EXPORT
+    saving, disk, exporting = _shown(dialog(Dialog.SAVE)), fa.ICON_FA_FLOPPY_DISK, fa.ICON_FA_FILE_EXPORT
+    yield Entry("Save ...", group, saving, _ctrl("s"), disk, in_fields=True)
     yield Entry("Export ...", group, _shown(export.ShowExport()), _ctrl("e"), exporting, in_fields=True)
     merging = _shown(opening.OpenFiles(merging=True))
     yield Entry("Merge a scene into this one ...", group, merging, _ctrl("m"), fa.ICON_FA_OBJECT_GROUP)
@@ -155,9 +157,8 @@ def _files() -> Iterable[Entry]:
     yield Entry("Cancel the reconstruction", group, lambda s: show.CancelJob() if s.scene.job else None)
     yield Entry("Keep only the two best photos", group, _pair)
     yield Entry("Put back the photos that were removed", group, _photos_back)
-    yield Entry(
-        "Clear the tray", group, lambda s: show.ClearPhotos() if s.scene.photos and not s.scene.job else None
-    )
+    clearing = lambda s: show.ClearPhotos() if s.scene.photos and not s.scene.job else None  # noqa: E731
+    yield Entry("Clear the tray", group, clearing)
     yield Entry("Quit", group, _always(do.Leave()), _ctrl("q"), fa.ICON_FA_RIGHT_FROM_BRACKET, in_fields=True)
 
 
@@ -199,16 +200,16 @@ def _program() -> Iterable[Entry]:
 def _asking() -> Iterable[Entry]:
     group = "Find"
     yield Entry("Type a phrase", group, _always(ask.FocusPhrase()), _ctrl("f"), in_fields=True)
-    yield Entry(
-        "Add a phrase", group, lambda s: ask.AddPrompt() if len(s.asking.prompts) < MOST_PROMPTS else None
-    )
+    adding = lambda s: ask.AddPrompt() if len(s.asking.prompts) < MOST_PROMPTS else None  # noqa: E731
+    yield Entry("Add a phrase", group, adding)
     yield Entry("Select what the phrase found", group, _meant)
     yield Entry("Save the phrases ...", group, _always(do.ShowDialog(Dialog.SAVE_PROMPTS)))
     yield Entry("Load phrases ...", group, _always(do.ShowDialog(Dialog.LOAD_PROMPTS)))
-    yield Entry("Dictionary", group, _dictionary)
-    yield Entry("Teach this file to answer phrases (lift)", group, _teach)
-    yield Entry("Keep names for other scenes", group, _taught(teach.KeepWords()))
-    yield Entry("Take names from other scenes", group, _taught(teach.TakeWords()))
+    yield Entry("Dictionary", group, _spoken(lambda s: ask.OpenDictionary(not s.preferences.dictionary_open)))
+    teaching = lambda s: lifting.TeachPhrases() if lifting.can_learn(s) else None  # noqa: E731
+    yield Entry("Teach this file to answer phrases (lift)", group, teaching)
+    yield Entry("Keep names for other scenes", group, _spoken(lambda _: teach.KeepWords()))
+    yield Entry("Take names from other scenes", group, _spoken(lambda _: teach.TakeWords()))
 
 
 def _meant(state: State) -> do.Command | None:
@@ -216,18 +217,9 @@ def _meant(state: State) -> do.Command | None:
     return None if prompt is None else edit.SelectByPhrase(prompt.key, state.editing.combine)
 
 
-def _taught(command: do.Command) -> Callable[[State], do.Command | None]:
-    return lambda state: command if state.scene.info is not None and state.scene.info.num_atoms else None
-
-
-def _teach(state: State) -> do.Command | None:
-    return lifting.TeachPhrases() if lifting.can_learn(state) else None
-
-
-def _dictionary(state: State) -> do.Command | None:
-    if state.scene.info is None or state.scene.info.num_atoms == 0:
-        return None
-    return ask.OpenDictionary(not state.preferences.dictionary_open)
+def _spoken(make: Callable[[State], do.Command]) -> Callable[[State], do.Command | None]:
+    """Once there is a scene with groups."""
+    return lambda state: make(state) if state.scene.info is not None and state.scene.info.num_atoms else None
 
 
 def _looking() -> Iterable[Entry]:
@@ -237,11 +229,12 @@ def _looking() -> Iterable[Entry]:
     yield Entry("Show all of the scene", group, _shown(camera.FrameAll()), _plain("z"))
     yield Entry("Fly to the selection", group, _shown(point.FrameSelection()), _plain("f"))
     yield Entry("Compare with the photo", group, _compare, _plain("p"))
-    yield Entry("Show the photos' cameras", group, _cameras, _plain("k"))
-    yield Entry("Names of things in the picture", group, _names, _plain("n"))
-    yield Entry("Stay near the photos", group, _near_photos)
-    yield Entry("Fill gaps from what is around them", group, _fill_gaps)
-    yield Entry("Grid on the floor", group, _floor_grid)
+    yield Entry("Show the photos' cameras", group, _switched("photos_in_space"), _plain("k"))
+    names = _made(lambda s: ask.NameThings(not s.asking.named))
+    yield Entry("Names of things in the picture", group, names, _plain("n"))
+    yield Entry("Stay near the photos", group, _switched("near_photos"))
+    yield Entry("Fill gaps from what is around them", group, _switched("fill_gaps"))
+    yield Entry("Grid on the floor", group, _switched("floor_grid"))
     for side, forward in camera.SIDES:
         keys = _plain(_SIDE_KEYS[side]) if side in _SIDE_KEYS else ()
         yield Entry(f"Look from {side}", group, _shown(camera.Face(forward)), keys)
@@ -254,29 +247,25 @@ def _looking() -> Iterable[Entry]:
     yield Entry("Add a key frame", group, _shown(film.AddKey()), _plain("m"))
     yield Entry("Remove the last key frame", group, lambda s: film.RemoveKey() if s.keys else None)
     yield Entry("Fly along the key frames", group, _shown(film.Preview()), _plain("j"))
-    yield Entry(
-        "Inventory: what is in the room", group, _inventory, _ctrl("l"), fa.ICON_FA_LIST_CHECK, in_fields=True
-    )
-    yield Entry("Tour: stops and notes", group, _tour, icon=fa.ICON_FA_SIGNS_POST)
+    listing, list_ = _made(lambda s: take.ShowInventory(not s.listing.open)), fa.ICON_FA_LIST_CHECK
+    yield Entry("Inventory: what is in the room", group, listing, _ctrl("l"), list_, in_fields=True)
+    touring = _made(lambda s: tour.ShowTour(not s.touring.open))
+    yield Entry("Tour: stops and notes", group, touring, icon=fa.ICON_FA_SIGNS_POST)
     yield Entry("Tour: add this view as a stop", group, _shown(tour.AddStop()))
-    yield Entry("Tour: play", group, lambda s: tour.Play() if s.tour.stops else None)
-    yield Entry(
-        "Tour: next stop", group, lambda s: tour.Step(1) if s.tour.stops else None, _plain("page_down")
-    )
-    yield Entry(
-        "Tour: previous stop", group, lambda s: tour.Step(-1) if s.tour.stops else None, _plain("page_up")
-    )
+    for name, command, keys in (
+        ("play", tour.Play(), ()),
+        ("next stop", tour.Step(1), _plain("page_down")),
+        ("previous stop", tour.Step(-1), _plain("page_up")),
+    ):
+        yield Entry(f"Tour: {name}", group, _toured(command), keys)
     for mode in PICTURES:
         keys = _plain(f"_{_DIGITS[KEYED.index(mode)]}") if mode in KEYED else ()
         yield Entry(f"Show: {mode.label}", group, _mode(mode), keys)
 
 
-def _inventory(state: State) -> do.Command | None:
-    return take.ShowInventory(not state.listing.open) if state.scene.info is not None else None
-
-
-def _tour(state: State) -> do.Command | None:
-    return tour.ShowTour(not state.touring.open) if state.scene.info is not None else None
+def _toured(command: do.Command) -> Callable[[State], do.Command | None]:
+    """Once there are stops."""
+    return lambda state: command if state.tour.stops else None
 
 
 def _mode(mode: Picture) -> Callable[[State], do.Command | None]:
@@ -289,32 +278,15 @@ def _compare(state: State) -> do.Command | None:
     return camera.Compare(None if in_space.comparing(state) else 0.5)
 
 
-def _names(state: State) -> do.Command | None:
-    return ask.NameThings(not state.asking.named) if state.scene.info is not None else None
+def _switched(name: str) -> Callable[[State], do.Command | None]:
+    """A preference on or off, by its name: once there is a scene, for the grid one that stands."""
 
+    def make(state: State) -> do.Command | None:
+        there = state.scene.info if name != "floor_grid" else state.world
+        wanted = state.preferences
+        return None if there is None else keep.Prefer(replace(wanted, **{name: not getattr(wanted, name)}))
 
-def _cameras(state: State) -> do.Command | None:
-    wanted = state.preferences
-    prefer = keep.Prefer(replace(wanted, photos_in_space=not wanted.photos_in_space))
-    return prefer if state.scene.info is not None else None
-
-
-def _near_photos(state: State) -> do.Command | None:
-    wanted = state.preferences
-    prefer = keep.Prefer(replace(wanted, near_photos=not wanted.near_photos))
-    return prefer if state.scene.info is not None else None
-
-
-def _fill_gaps(state: State) -> do.Command | None:
-    wanted = state.preferences
-    prefer = keep.Prefer(replace(wanted, fill_gaps=not wanted.fill_gaps))
-    return prefer if state.scene.info is not None else None
-
-
-def _floor_grid(state: State) -> do.Command | None:
-    wanted = state.preferences
-    prefer = keep.Prefer(replace(wanted, floor_grid=not wanted.floor_grid))
-    return prefer if state.world is not None else None
+    return make
 
 
 def _tools() -> Iterable[Entry]:

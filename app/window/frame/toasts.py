@@ -42,9 +42,8 @@ def _toast(toast: Toast, look: Look) -> list[do.Command]:
     right, top = look.px(400 - 16 - 30), imgui.get_style().window_padding.y - look.px(6)
     if error:
         imgui.set_cursor_pos(ImVec2(right - look.px(38), top))
-        if widgets.quiet_button(f"{fa.ICON_FA_COPY}##copy", "Copy"):
-            issued.append(do.CopyText(toast.text))
+        issued += widgets.press(f"{fa.ICON_FA_COPY}##copy", do.CopyText(toast.text), "Copy", quiet=True)
     imgui.set_cursor_pos(ImVec2(right, top))
-    if widgets.quiet_button(f"{fa.ICON_FA_XMARK}##close", "Close"):
-        issued.append(do.DismissToast(toast.key))
-    return issued
+    return issued + widgets.press(
+        f"{fa.ICON_FA_XMARK}##close", do.DismissToast(toast.key), "Close", quiet=True
+    )

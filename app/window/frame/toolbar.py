@@ -34,7 +34,16 @@ def draw(state: State, look: Look) -> list[do.Command]:
     imgui.same_line(imgui.get_window_width() - width - look.px(8))
     issued += _fov(state, look) if roomy else []
     issued += inventory_panel.button(state) + tour_panel.button(state) + dictionary.button(state)
-    return issued + _home(state) + _files(state, look)
+    there = state.scene.info is not None
+    for icon, command, tip in (
+        (fa.ICON_FA_HOUSE, camera.Home(), "Back to the first photo's view  (H)"),
+        (fa.ICON_FA_EXPAND, camera.FrameAll(), "Show all of the scene  (Z)"),
+        (fa.ICON_FA_FILE_EXPORT, export.ShowExport(), "Export pictures, masks, videos, splats  (Ctrl+E)"),
+    ):
+        imgui.same_line()
+        issued += widgets.press(icon, command, tip, able=there)
+    imgui.same_line()
+    return issued + menu.draw(state, look)
 
 
 def _fov(state: State, look: Look) -> list[do.Command]:
@@ -46,30 +55,3 @@ def _fov(state: State, look: Look) -> list[do.Command]:
     imgui.end_disabled()
     imgui.same_line()
     return [camera.SetFov(fov)] if changed else []
-
-
-def _home(state: State) -> list[do.Command]:
-    issued: list[do.Command] = []
-    imgui.same_line()
-    imgui.begin_disabled(state.scene.info is None)
-    if imgui.button(fa.ICON_FA_HOUSE):
-        issued.append(camera.Home())
-    widgets.tooltip("Back to the first photo's view  (H)")
-    imgui.end_disabled()
-    return issued
-
-
-def _files(state: State, look: Look) -> list[do.Command]:
-    issued: list[do.Command] = []
-    imgui.same_line()
-    imgui.begin_disabled(state.scene.info is None)
-    if imgui.button(fa.ICON_FA_EXPAND):
-        issued.append(camera.FrameAll())
-    widgets.tooltip("Show all of the scene  (Z)")
-    imgui.same_line()
-    if imgui.button(fa.ICON_FA_FILE_EXPORT):
-        issued.append(export.ShowExport())
-    widgets.tooltip("Export pictures, masks, videos, splats  (Ctrl+E)")
-    imgui.end_disabled()
-    imgui.same_line()
-    return issued + menu.draw(state, look)

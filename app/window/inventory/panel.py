@@ -22,7 +22,7 @@ SURE = 0.95
 """From here on a thing is what it is called: `langflash_core.writing.inventory.words`, which loads torch."""
 _SIZE = (372.0, 560.0)  # design pixels, the height at most
 _LEAST = (300.0, 220.0)
-_BELOW, _MARGIN = 150.0, 12.0  # of axes and key frames, which are above; of the picture's border
+_BELOW = 150.0  # of axes and key frames, which are above
 _BAR = 46.0  # of how sure
 _ASIDE = 120.0  # how far a caption goes to be seen
 _NAME = "##name"
@@ -32,13 +32,11 @@ _EDGES = ((0, 1), (1, 2), (2, 3), (3, 0), (4, 5), (5, 6), (6, 7), (7, 4), (0, 4)
 
 def button(state: State) -> list[do.Command]:
     """Opens the inventory, or closes it."""
-    imgui.begin_disabled(state.scene.info is None)
-    label = f"{fa.ICON_FA_LIST_CHECK}##inventory"
-    pressed = widgets.primary_button(label) if state.listing.open else imgui.button(label)
-    imgui.end_disabled()
-    widgets.tooltip("Inventory: what is in the room, how many, how large, where and how sure  (Ctrl+L)")
+    label, on, there = f"{fa.ICON_FA_LIST_CHECK}##inventory", state.listing.open, state.scene.info is not None
+    tip = "Inventory: what is in the room, how many, how large, where and how sure  (Ctrl+L)"
+    issued: list[do.Command] = [*widgets.press(label, take.ShowInventory(not on), tip, able=there, on=on)]
     imgui.same_line()
-    return [take.ShowInventory(not state.listing.open)] if pressed else []
+    return issued
 
 
 def draw(state: State, look: Look, place: ImVec2, size: ImVec2, above: ImVec2) -> list[do.Command]:
@@ -46,7 +44,7 @@ def draw(state: State, look: Look, place: ImVec2, size: ImVec2, above: ImVec2) -
     the picture's place without the strip of photos at its foot, whose buttons it does not cover."""
     if not state.listing.open:
         return []
-    corner, extent = _stands(look, place, size, above)
+    corner, extent = boxes.opens_at(place, size, above.y, look, _BELOW, _SIZE, _LEAST[1])
     imgui.set_next_window_pos(corner, imgui.Cond_.appearing)
     imgui.set_next_window_size(extent, imgui.Cond_.appearing)
     imgui.set_next_window_size_constraints(look.vec(*_LEAST), imgui.get_io().display_size)
@@ -61,18 +59,6 @@ def draw(state: State, look: Look, place: ImVec2, size: ImVec2, above: ImVec2) -
     imgui.end()
     imgui.pop_style_var()
     return issued if kept else [*issued, take.ShowInventory(False)]
-
-
-def _stands(look: Look, place: ImVec2, size: ImVec2, above: ImVec2) -> tuple[ImVec2, ImVec2]:
-    """Its corner and its size where it opens."""
-    aside = boxes.over_panel(place, size, look)
-    if aside is not None:
-        return aside
-    margin = look.px(_MARGIN)
-    top = place.y + look.px(_BELOW)
-    width = min(look.px(_SIZE[0]), size.x - 2 * margin)
-    height = min(look.px(_SIZE[1]), max(place.y + above.y - top - margin, look.px(_LEAST[1])))
-    return ImVec2(place.x + size.x - margin - width, top), ImVec2(width, height)
 
 
 def _body(state: State, look: Look, picture: tuple[float, float, float]) -> list[do.Command]:
@@ -209,16 +195,12 @@ def _foot(state: State, look: Look) -> list[do.Command]:
     """Where lengths come from, and the files."""
     issued: list[do.Command] = []
     listing = state.listing
+    text, tip = "Lengths are in scene units.", "Measure one (T) and type its true length."
     if listing.guess is not None:
-        by = ", ".join(listing.guess.by)
-        text, tip = (
-            f"Lengths are estimates, ± {listing.guess.spread:.0%}.",
-            f"By {by}. Measure one (T) and type its true length.",
-        )
+        text = f"Lengths are estimates, ± {listing.guess.spread:.0%}."
+        tip = f"By {', '.join(listing.guess.by)}. {tip}"
     elif listing.unit == "m":
         text, tip = "Lengths use the scale that you set.", ""
-    else:
-        text, tip = "Lengths are in scene units.", "Measure one (T) and type its true length."
     imgui.text_colored(theme.MUTED, text)
     widgets.tooltip(tip)
     if state.world is None:
@@ -230,9 +212,7 @@ def _foot(state: State, look: Look) -> list[do.Command]:
         label = what.label.partition(", ")[2].upper().lstrip(".") or what.label
         if place:
             widgets.go_on(widgets.button_width(label), right, look.px(6))
-        if imgui.button(f"{label}##export"):
-            issued.append(export.ShowExport(what))
-        widgets.tooltip(what.tip)
+        issued += widgets.press(f"{label}##export", export.ShowExport(what), what.tip)
     return issued
 
 
@@ -255,10 +235,8 @@ def draw_box(state: State, look: Look, corner: ImVec2, size: ImVec2) -> None:
         return
     x, y = found[1][0]
     walls = boxes.windows_over((corner.x, corner.y, corner.x + size.x, corner.y + size.y))
-    left, top, right, bottom = caption_box(look, (corner.x + float(x), corner.y + float(y)), name, walls)
-    ground = imgui.IM_COL32(14, 16, 20, 205)
-    canvas.add_rect_filled(ImVec2(left, top), ImVec2(right, bottom), ground, look.px(5))
-    canvas.add_text(ImVec2(left + look.px(7), top + look.px(3)), widgets.u32(theme.DARK.TEXT), name)
+    left, top, *_ = caption_box(look, (corner.x + float(x), corner.y + float(y)), name, walls)
+    widgets.caption(name, ImVec2(left, top), look, shade=205)
 
 
 def caption_box(look: Look, at: tuple[float, float], text: str, walls: tuple[boxes.Box, ...]) -> boxes.Box:

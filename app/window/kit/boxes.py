@@ -9,6 +9,7 @@ from .look import Look
 Box = tuple[float, float, float, float]
 
 _NARROW, _PANEL = 640.0, 300.0  # design pixels: of pictures, of panels
+_MARGIN = 12.0  # design pixels between a window and the picture's border
 _PASSING = imgui.WindowFlags_.child_window | imgui.WindowFlags_.tooltip | imgui.WindowFlags_.popup
 
 
@@ -64,6 +65,31 @@ def over_panel(place: ImVec2, size: ImVec2, look: Look) -> tuple[ImVec2, ImVec2]
     if size.x >= look.px(_NARROW) or place.x < look.px(_PANEL):
         return None
     return ImVec2(0, 0), ImVec2(place.x, place.y + size.y)
+
+
+def opens_at(
+    place: ImVec2,
+    size: ImVec2,
+    room: float,
+    look: Look,
+    below: float,
+    wanted: tuple[float, float],
+    least: float,
+) -> tuple[ImVec2, ImVec2]:
+    """Corner and size of a window about a picture where it opens: over the panel, or at the picture's right,
+    `below` its top.
+
+    Args:
+        room: height of the picture that it may cover, pixels. wanted: width and height at the most.
+        least: height at the least, design pixels.
+    """
+    aside = over_panel(place, size, look)
+    if aside is not None:
+        return aside
+    top, margin = place.y + look.px(below), look.px(_MARGIN)
+    width = min(look.px(wanted[0]), size.x - 2 * margin)
+    height = min(look.px(wanted[1]), max(place.y + room - top - margin, look.px(least)))
+    return ImVec2(place.x + size.x - margin - width, top), ImVec2(width, height)
 
 
 def windows_over(picture: Box) -> tuple[Box, ...]:

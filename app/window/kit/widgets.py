@@ -2,7 +2,7 @@
 
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
-from typing import TypeVar
+from typing import Generic, NamedTuple, TypeVar
 
 from imgui_bundle import ImVec2, ImVec4, imgui
 from imgui_bundle import icons_fontawesome_6 as fa
@@ -70,6 +70,55 @@ def primary_button(label: str, size: ImVec2 | None = None) -> bool:
     lighter = ImVec4(min(accent.x * 1.06, 1), accent.y * 1.08, accent.z * 1.3, 1)
     with colours(button=accent, button_hovered=lighter, button_active=accent, text=theme.ON_ACCENT):
         return imgui.button(label, size or ImVec2(0, 0))
+
+
+def press(
+    label: str,
+    command: _Value,
+    tip: str = "",
+    size: ImVec2 | None = None,
+    able: bool = True,
+    on: bool = False,
+    quiet: bool = False,
+) -> list[_Value]:
+    """A button's command, once it is pressed. able: else it is greyed. on: as the primary one. quiet: without
+    a frame."""
+    if not able:
+        imgui.begin_disabled()
+    if on or quiet:
+        pressed = primary_button(label, size) if on else quiet_button(label)
+    else:
+        pressed = imgui.button(label, size or ImVec2(0, 0))
+    if not able:
+        imgui.end_disabled()
+    tooltip(tip)
+    return [command] if pressed else []
+
+
+class Answer(NamedTuple, Generic[_Value]):
+    """A button below a question. width: design pixels. able: else it is greyed."""
+
+    label: str
+    width: float
+    command: _Value
+    tip: str = ""
+    able: bool = True
+
+
+def answers(look: Look, *given: Answer[_Value], default: int = 0) -> list[_Value]:
+    """The buttons below a question, side by side while the window has room; the command of the pressed one.
+    default: the place of the one that Enter presses."""
+    issued: list[_Value] = []
+    for place, (label, width, command, tip, able) in enumerate(given):
+        if place:
+            beside(look.px(width))
+        imgui.begin_disabled(not able)
+        button = default_button if place == default else imgui.button
+        if button(label, look.vec(width, 0)):
+            issued.append(command)
+        imgui.end_disabled()
+        tooltip(tip)
+    return issued
 
 
 def default_button(label: str, size: ImVec2 | None = None, confirmed: bool = False) -> bool:
@@ -285,6 +334,22 @@ def rgba(colour: tuple[float, float, float], alpha: float = 1.0) -> ImVec4:
 def u32(colour: ImVec4) -> int:
     """A draw-list colour."""
     return imgui.color_convert_float4_to_u32(colour)
+
+
+def centred(text: str, middle: ImVec2, colour: ImVec4) -> None:
+    """Draw a text around a point of the screen."""
+    extent = imgui.calc_text_size(text)
+    at = ImVec2(middle.x - extent.x / 2, middle.y - extent.y / 2)
+    imgui.get_window_draw_list().add_text(at, u32(colour), text)
+
+
+def caption(text: str, corner: ImVec2, look: Look, shade: int = 190) -> None:
+    """Draw words on a dark ground, whose upper left corner is given. shade: of the ground, up to 255."""
+    canvas, extent = imgui.get_window_draw_list(), imgui.calc_text_size(text)
+    end = ImVec2(corner.x + extent.x + look.px(14), corner.y + extent.y + look.px(6))
+    canvas.add_rect_filled(corner, end, imgui.IM_COL32(14, 16, 20, shade), look.px(5))
+    at = ImVec2(corner.x + look.px(7), corner.y + look.px(3))
+    canvas.add_text(at, u32(theme.DARK.TEXT), text)
 
 
 def gap(height: float) -> None:

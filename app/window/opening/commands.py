@@ -9,23 +9,21 @@ from langflash_core.images.strip import REPEAT, Choice, Still, Strip, choose, no
 
 from ..commands import Notify, ShowDialog
 from ..dialogs import Dialog
+from ..protocol import Outward
 from ..scene.drops import NOT_TYPED, Typed
 from ..scene.state import LOOKING_THROUGH, Job, Photo
 from ..state import State
-from .state import NO_OPENING, Film, Folder, told_film
+from .state import NO_OPENING, Film, Folder, Opening, told_film
 
 
 @dataclass(frozen=True)
-class OpenFiles:
+class OpenFiles(Outward):
     """Look for files: with the desktop's own dialog where there is one (the effects know), else with ours.
 
     merging: for a scene that is to be merged into the one on show.
     """
 
     merging: bool = False
-
-    def apply(self, state: State) -> State:
-        return state
 
 
 @dataclass(frozen=True)
@@ -49,13 +47,8 @@ class LookForPlace:
 
     def apply(self, state: State) -> State:
         wanted = state.exporting.form.path if state.dialog is Dialog.EXPORT else state.typed.text
-        asked = replace(
-            NO_OPENING,
-            asker=state.dialog,
-            name=Path(wanted).name,
-            pending=state.scene.pending,
-            film=state.opening.film,
-        )
+        pending, film = state.scene.pending, state.opening.film
+        asked = Opening(asker=state.dialog, name=Path(wanted).name, pending=pending, film=film)
         return replace(state, opening=asked)
 
 
@@ -97,14 +90,11 @@ class FolderUsed:
 
 
 @dataclass(frozen=True)
-class MorePictures:
+class MorePictures(Outward):
     """These photos of a folder are still to be made small, if one is still there."""
 
     folder: Path
     paths: tuple[Path, ...]
-
-    def apply(self, state: State) -> State:
-        return state
 
 
 @dataclass(frozen=True)
@@ -121,11 +111,8 @@ class Choose:
 
 
 @dataclass(frozen=True)
-class Paste:
+class Paste(Outward):
     """Open what the clipboard holds: paths, files or a picture."""
-
-    def apply(self, state: State) -> State:
-        return state
 
 
 # Films
@@ -155,8 +142,7 @@ class FilmRead:
             film = proposed(self.path, self.strip, min(room_for_frames(state), PHOTO_LIMITS.film_photos))
         except FilmError as error:
             return Notify(str(error)).apply(state)
-        state = state.with_opening(film=film)
-        return ShowDialog(Dialog.FILM).apply(state)
+        return ShowDialog(Dialog.FILM).apply(state.with_opening(film=film))
 
 
 @dataclass(frozen=True)
@@ -171,7 +157,8 @@ class ProposeFrames:
         if film is None:
             return state
         most = min(max(2, self.most), room_for_frames(state))
-        return _with_film(state, proposed(film.path, film.strip, most, most if self.exactly else 2))
+        chosen = proposed(film.path, film.strip, most, most if self.exactly else 2)
+        return state.with_opening(film=chosen)
 
 
 @dataclass(frozen=True)
@@ -188,7 +175,7 @@ class SwitchFrame:
         if len(chosen) > room_for_frames(state):
             text = f"At most {room_for_frames(state)} frames fit into one scene; exclude another one first."
             return Notify(text).apply(state)
-        return _with_film(state, replace(film, chosen=tuple(sorted(chosen))))
+        return state.with_opening(film=replace(film, chosen=tuple(sorted(chosen))))
 
 
 @dataclass(frozen=True)
@@ -220,11 +207,8 @@ def _reason(still: Still, choice: Choice, index: int) -> str:
         return "repeats" if still.why_not == REPEAT else "other_shots"
     if choice.until is not None and still.seconds > choice.until:
         return "beyond"
-    return (
-        "blurred"
-        if choice.relative[index] < CHOOSING.blurred or still.smear > CHOOSING.smeared
-        else "between"
-    )
+    blurred = choice.relative[index] < CHOOSING.blurred or still.smear > CHOOSING.smeared
+    return "blurred" if blurred else "between"
 
 
 def room_for_frames(state: State) -> int:
@@ -235,8 +219,9 @@ def room_for_frames(state: State) -> int:
 def films_of(state: State) -> tuple[dict, ...]:
     """Of the film that photos in the tray are frames of, what a scene's record says."""
     film = state.opening.film
-    of_film = film is not None and any(photo.path.parent == film.strip.folder for photo in state.scene.photos)
-    return (told_film(film),) if film is not None and of_film else ()
+    if film is None or film.strip.folder not in {path.parent for path in state.scene.paths}:
+        return ()
+    return (told_film(film),)
 
 
 def beside_frames(state: State) -> tuple[Photo, ...]:
@@ -247,7 +232,3 @@ def beside_frames(state: State) -> tuple[Photo, ...]:
     return tuple(
         photo for photo in state.scene.photos if film is None or photo.path.parent != film.strip.folder
     )
-
-
-def _with_film(state: State, film: Film) -> State:
-    return state.with_opening(film=film)

@@ -14,6 +14,7 @@ from ..dialogs import Dialog
 from ..editing.state import fresh
 from ..filming.state import NO_FILMING
 from ..governor import Around
+from ..protocol import Outward
 from ..state import State
 from .memory import SceneMemory
 from .near import first_stand
@@ -50,11 +51,9 @@ class AddPhotos:
     def apply(self, state: State) -> State:
         known = {p.path for p in state.scene.photos}
         fresh = tuple(Photo(p) for p in dict.fromkeys(self.paths) if p not in known)
-        photos = (*state.scene.photos, *fresh)
-        after = state.with_scene(photos=photos[: PHOTO_LIMITS.max_photos])
-        if len(photos) > PHOTO_LIMITS.max_photos:
-            left = len(photos) - PHOTO_LIMITS.max_photos
-            most = PHOTO_LIMITS.max_photos
+        photos, most = (*state.scene.photos, *fresh), PHOTO_LIMITS.max_photos
+        after, left = state.with_scene(photos=photos[:most]), len(photos) - most
+        if left > 0:
             text = f"{left} photos were left out: a scene takes at most {most}; clear the tray first."
             after = Notify(text).apply(after)
         return after
@@ -86,9 +85,8 @@ def _with_fewer(state: State, photos: tuple[Photo, ...]) -> State:
         return state
     before = old.taken_out if old.num_taken_out else None
     left = tuple(photo.path for photo in photos)
-    return state.with_scene(
-        photos=photos, taken_out=TakenOut(old.photos, left, state.editing.history, before)
-    )
+    taken = TakenOut(old.photos, left, state.editing.history, before)
+    return state.with_scene(photos=photos, taken_out=taken)
 
 
 @dataclass(frozen=True)
@@ -120,8 +118,7 @@ class PhotoFailed:
     problem: str
 
     def apply(self, state: State) -> State:
-        photos = (replace(p, problem=self.problem) if p.path == self.path else p for p in state.scene.photos)
-        return state.with_scene(photos=tuple(photos))
+        return _change_photo(state, self.path, problem=self.problem)
 
 
 @dataclass(frozen=True)
@@ -186,7 +183,7 @@ class PairChosen:
 
     def apply(self, state: State) -> State:
         state = state.with_scene(choosing=False)
-        if tuple(photo.path for photo in state.scene.photos) != self.paths:
+        if state.scene.paths != self.paths:
             return state  # the tray has changed meanwhile: the answer is about other photos
         if self.pair is None:
             text = "No two of these photos match; take photos that share at least a third of the picture."
@@ -262,11 +259,8 @@ class OpenPaths:
 
 
 @dataclass(frozen=True)
-class Loaded:
+class Loaded(Outward):
     """The worker has loaded what drawing needs: while there is no scene, shaders can be compiled."""
-
-    def apply(self, state: State) -> State:
-        return state
 
 
 @dataclass(frozen=True)
@@ -281,16 +275,15 @@ class SceneArrived:
     replaces: bool = False
 
     def apply(self, state: State) -> State:
-        state = self._shown(state).with_scene(rooms=self._others(state))
+        others = state.scene.rooms if self.replaces else _rooms(state, self.info)
+        state = self._shown(state).with_scene(rooms=others)
         if self.room is None:
             return state
         room, views = self.room, self.info.views
         view = views.index(room.pose) if room.pose in views else None
-        state = state.with_editing(saved=room.saved).with_scene(photos=room.photos, pose=room.pose, view=view)
-        return state.with_scene(unhidden=room.unhidden, shown_by=room.shown_by)
-
-    def _others(self, state: State) -> tuple[Room, ...]:
-        return state.scene.rooms if self.replaces else _rooms(state, self.info)
+        return state.with_editing(saved=room.saved).with_scene(
+            photos=room.photos, pose=room.pose, view=view, unhidden=room.unhidden, shown_by=room.shown_by
+        )
 
     def _shown(self, state: State) -> State:
         old, info, asking = state.scene, self.info, state.asking.without_scene()
@@ -341,7 +334,7 @@ def _rooms(state: State, coming: SceneInfo) -> tuple[Room, ...]:
 
 
 @dataclass(frozen=True)
-class Thinned:
+class Thinned(Outward):
     """A share of the scene's Gaussians for a moving camera is made (scene/thin.py), of a huge scene around
     a place."""
 
@@ -350,18 +343,12 @@ class Thinned:
     thinned: "Fewer" = field(compare=False, repr=False)
     around: Around | None = None
 
-    def apply(self, state: State) -> State:
-        return state
-
 
 @dataclass(frozen=True)
-class GoToRoom:
+class GoToRoom(Outward):
     """Back to the scene with this number, which was on show before."""
 
     serial: int
-
-    def apply(self, state: State) -> State:
-        return state
 
 
 # What takes the place of the scene on show
@@ -396,12 +383,18 @@ class SaveFirst:
 
 @dataclass(frozen=True)
 class AskAboutDrop:
-    """Photos were dropped on a scene: do they belong to it?"""
+    """Photos were dropped on a scene: do they belong to it? Or a scene: is it to be opened, or merged?"""
 
-    photos: tuple[Path, ...]
+    paths: tuple[Path, ...]
+    dialog: Dialog
 
     def apply(self, state: State) -> State:
-        return replace(state.with_scene(dropped=self.photos), dialog=Dialog.DROP)
+        return replace(state.with_scene(dropped=self.paths), dialog=self.dialog)
+
+
+def try_out(photos: tuple[Path, ...]) -> Command:
+    """A new room of these photos."""
+    return Instead((SetPhotosAside(), AddPhotos(photos), Reconstruct()))
 
 
 def dropped(state: State, photos: tuple[Path, ...], new: bool) -> Command:
@@ -409,16 +402,6 @@ def dropped(state: State, photos: tuple[Path, ...], new: bool) -> Command:
     wants that at once."""
     taken: tuple[Command, ...] = (*((SetPhotosAside(),) if new else ()), AddPhotos(photos))
     return Instead((*taken, Reconstruct())) if state.preferences.start_at_once else All(taken)
-
-
-@dataclass(frozen=True)
-class AskAboutScene:
-    """A scene was dropped on a scene: is it to be opened, or merged into it?"""
-
-    path: Path
-
-    def apply(self, state: State) -> State:
-        return replace(state.with_scene(dropped=(self.path,)), dialog=Dialog.DROP_SCENE)
 
 
 @dataclass(frozen=True)
@@ -488,7 +471,7 @@ class WorkFound:
     there: bool
 
     def apply(self, state: State) -> State:
-        if tuple(photo.path for photo in state.scene.photos) != self.paths:
+        if state.scene.paths != self.paths:
             return state
         return state.with_scene(unfinished=self.paths if self.there else ())
 
@@ -505,12 +488,10 @@ class Progressed:
         if job is None:
             return state
         fraction = min(max(self.fraction, 0.0), 1.0)
-        if head_of(self.stage) == head_of(job.stage):  # the same, at another of its photos
-            return state.with_scene(job=replace(job, stage=self.stage, fraction=fraction))
-        done = (*job.done, (head_of(job.stage), state.now - job.started))
-        return state.with_scene(
-            job=replace(job, stage=self.stage, fraction=fraction, started=state.now, done=done)
-        )
+        if head_of(self.stage) != head_of(job.stage):  # not the same at another of its photos
+            done = (*job.done, (head_of(job.stage), state.now - job.started))
+            job = replace(job, started=state.now, done=done)
+        return state.with_scene(job=replace(job, stage=self.stage, fraction=fraction))
 
 
 @dataclass(frozen=True)
@@ -531,8 +512,7 @@ class JobCancelled:
         job = state.scene.job
         if job is None or not job.pausing:
             return Notify("Stopped.", "info").apply(_ended(state.with_scene(unfinished=())))
-        paths = tuple(photo.path for photo in state.scene.photos)
-        return Notify(PAUSED, "info").apply(state.with_scene(job=None, unfinished=paths))
+        return Notify(PAUSED, "info").apply(state.with_scene(job=None, unfinished=state.scene.paths))
 
 
 def _ended(state: State) -> State:

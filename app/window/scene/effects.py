@@ -1,9 +1,8 @@
 """What the scene asks of the world: paths from the disk, the worker's jobs, the scene in the renderer."""
 
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from collections.abc import Callable, Sequence
+from contextlib import suppress
 from dataclasses import replace
-from pathlib import Path
 
 from langflash_core.base.colormaps import colour_bar
 from langflash_core.base.formats import COLOUR_MAPS
@@ -12,6 +11,7 @@ from langflash_core.geometry.poses import Vector
 from langflash_core.reconstruction.networks import Networks
 
 from ..commands import Command, Notify
+from ..dialogs import Dialog
 from ..editing.placing import SetHandle
 from ..editing.state import Handle, Point
 from ..effects import Effects, Hands
@@ -24,7 +24,6 @@ from .commands import (
     AddPhotos,
     All,
     AskAboutDrop,
-    AskAboutScene,
     CancelJob,
     ChoosePair,
     GoOn,
@@ -78,37 +77,37 @@ class SceneEffects(Effects):
 
     def follow(self, command: Command, before: State, state: State) -> None:
         """Jobs and tasks of the worker; a scene that has come goes to the renderer."""
-        submit = self._hands.submit
+        submit, info, marks = self._hands.submit, state.scene.info, state.editing.marks
         match command:
             case OpenPaths(paths, was_dropped):
                 self._open(paths, was_dropped, state)
-            case MergeScene() | AddToScene():
-                self._grow(command, state)
+            case MergeScene(path) if info is not None and marks is not None:
+                submit(JoinScenes(info, marks, path))
+            case AddToScene(photos) if info is not None and marks is not None:
+                submit(PutInPhotos(info, marks, photos, self._networks))
             case AddPhotos(paths):
                 submit(MakeThumbnails(paths))
             case Reconstruct() if state.scene.photos:
-                photos, detail = state.scene.photos, state.preferences.detail
-                paths, fovs = tuple(p.path for p in photos), tuple(p.fov for p in photos)
-                submit(ReconstructPhotos(paths, fovs, detail, films_of(state), self._networks))
+                paths, fovs = state.scene.paths, tuple(photo.fov for photo in state.scene.photos)
+                detail, films = state.preferences.detail, films_of(state)
+                submit(ReconstructPhotos(paths, fovs, detail, films, self._networks))
             case OpenScene(path, edits, alone):
                 submit(LoadScene(path, edits, alone))
-            case SaveScene(path) if state.scene.info is not None:
-                submit(WriteScene(state.scene.info.scene, path, state.editing.marks))
-            case LevelScene() if state.scene.info is not None and state.editing.marks is not None:
-                info = state.scene.info
-                submit(FindWorld(info.serial, info.memory, state.editing.marks))
+            case SaveScene(path) if info is not None:
+                submit(WriteScene(info.scene, path, marks))
+            case LevelScene() if info is not None and marks is not None:
+                submit(FindWorld(info.serial, info.memory, marks))
             case CancelJob() | PauseJob():
                 self._end_job(state)
             case ChoosePair() if state.scene.choosing and not before.scene.choosing:
-                submit(FindPair(tuple(photo.path for photo in state.scene.photos)))
-            case SceneArrived(info, replaces=changed):
-                self._show(info, before.scene.info, changed, state)
+                submit(FindPair(state.scene.paths))
+            case SceneArrived(arrived, replaces=changed):
+                self._show(arrived, before.scene.info, changed, state)
             case Thinned(scene, share, thinned, around):
-                with self._told():
-                    self._viewport.thin(scene, share, thinned, around)
+                self._viewport.thin(scene, share, thinned, around)
             case TakeHold(at):
                 self._hold(at)
-            case Loaded() if state.scene.info is None and self._viewport.warm():
+            case Loaded() if info is None and self._viewport.warm():
                 self._hands.dispatch(Loaded())
             case _:
                 self._go_on(command, before, state)
@@ -125,16 +124,6 @@ class SceneEffects(Effects):
         if info is not None and share is not None:
             self._hands.submit(ThinAround(info.serial, info.memory, share, eye))
 
-    def _grow(self, command: MergeScene | AddToScene, state: State) -> None:
-        """What comes to the scene on show."""
-        info, marks = state.scene.info, state.editing.marks
-        if info is None or marks is None:
-            return
-        if isinstance(command, MergeScene):
-            self._hands.submit(JoinScenes(info, marks, command.path))
-        else:
-            self._hands.submit(PutInPhotos(info, marks, command.photos, self._networks))
-
     def _hold(self, at: Point) -> None:
         """A hand turns the scene around what the picture shows under it."""
         found = self._viewport.read(at)
@@ -146,12 +135,13 @@ class SceneEffects(Effects):
         self._hands.cancel()
         job = state.scene.job
         if job is not None and job.pausable and not job.pausing:
-            self._hands.submit(DropWork(_paths(state)))
+            self._hands.submit(DropWork(state.scene.paths))
 
     def _look_for_work(self, before: State, state: State) -> None:
         """Other photos in the tray may be ones on which work was begun."""
-        if _paths(before) != _paths(state) and len(state.scene.photos) >= FEWEST and state.scene.job is None:
-            self._hands.submit(LookForWork(_paths(state)))
+        paths = state.scene.paths
+        if paths != before.scene.paths and len(paths) >= FEWEST and state.scene.job is None:
+            self._hands.submit(LookForWork(paths))
 
     def _go_on(self, command: Command, before: State, state: State) -> None:
         """Commands that stand for others."""
@@ -186,10 +176,9 @@ class SceneEffects(Effects):
         if info is None or view is None or state.scene.compare is None:
             return
         known = before.scene.info is info and before.scene.view == view and before.scene.compare is not None
-        if len(info.scene.photos) <= WHOLE_PHOTOS or view >= len(info.scene.photos) or known:
-            return
-        with suppress(OSError):
-            self._thumbnails.put_encoded(WHOLE, info.scene.photos[view])
+        if WHOLE_PHOTOS < len(info.scene.photos) > view and not known:
+            with suppress(OSError):
+                self._thumbnails.put_encoded(WHOLE, info.scene.photos[view])
 
     def _open(self, paths: Sequence[str], was_dropped: bool, state: State) -> None:
         perform = self._hands.perform
@@ -208,21 +197,23 @@ class SceneEffects(Effects):
         elif len(drop.scenes) > 1:
             perform(Notify(f"Only {drop.scenes[0].name} was opened; open one scene at a time."))
         if drop.photos and state.scene.info is not None:
-            perform(AskAboutDrop(drop.photos))
+            perform(AskAboutDrop(drop.photos, Dialog.DROP))
         elif drop.photos and drop.films:
             perform(AddPhotos(drop.photos))
         elif drop.photos:
             perform(dropped(state, drop.photos, new=False))
         elif drop.scenes and was_dropped and state.scene.info is not None:
-            perform(AskAboutScene(drop.scenes[0]))
+            perform(AskAboutDrop(drop.scenes[:1], Dialog.DROP_SCENE))
         elif drop.scenes and not drop.films:
             perform(Instead((OpenScene(drop.scenes[0], alone=True),)))
 
     def _show(self, info: SceneInfo, old: SceneInfo | None, changed: bool, state: State) -> None:
         """Bring a scene to the renderer; the worker makes what moves through it, then decodes its photos, of
         which many take longer than a frame. No photo of the `old` one stays on a button of another's."""
-        with self._told():
+        try:
             self._viewport.set_scene(info.serial, info.scene, changed)
+        except LangFlashError as error:  # what OpenGL cannot do
+            self._hands.perform(Notify(str(error)))
         self._choose_around(state)
         for share in self._viewport.shares:
             self._hands.submit(Thin(info.serial, info.scene, share))
@@ -237,16 +228,3 @@ class SceneEffects(Effects):
         for colormap in COLOUR_MAPS:
             self._thumbnails.put(f"bar {colormap}", colour_bar(colormap))
         self._entitle(f"{info.name} - LangFlash")
-
-    @contextmanager
-    def _told(self) -> Iterator[None]:
-        """What OpenGL cannot do is a message."""
-        try:
-            yield
-        except LangFlashError as error:
-            self._hands.perform(Notify(str(error)))
-
-
-def _paths(state: State) -> tuple[Path, ...]:
-    """Of the photos in the tray."""
-    return tuple(photo.path for photo in state.scene.photos)

@@ -12,30 +12,26 @@ import numpy as np
 
 from langflash_core.errors import Cancelled
 from langflash_core.geometry.poses import Pose, to_camera
-from langflash_core.scene.edits import Marks
 from langflash_core.scene.mask import Mask
 
 from ..editing.mending import HiddenForGood
 from ..editing.state import Region, Spot
-from ..requests import Asked, Job
+from ..requests import Asked
 from .merging import Merged
 from .state import SceneInfo
-from .work import describe_scene
+from .work import OnShow, describe_scene
 
 if TYPE_CHECKING:
     from langflash_core.mending.cloning import Stroke
-    from langflash_core.types import Frame
+    from langflash_core.types import Frame, Scene
 
 MOST_SIDE = 720  # pixels of the picture that a brush is looked at in
 _EDGE = 0.01  # of a photo's longer side: so far colours of a thing run over its edge
 
 
 @dataclass(frozen=True)
-class FillHole(Job):
+class FillHole(OnShow):
     """The selection taken away with what runs over its edge, and the hole filled from what is around."""
-
-    info: SceneInfo
-    marks: Marks = field(repr=False)
 
     def run(self, serial: int, progress: Callable[[str, float], None], cancelled: Asked) -> Merged:
         import torch
@@ -44,7 +40,6 @@ class FillHole(Job):
         from langflash_core.mending.hiding import preview
         from langflash_core.mending.looks import draw_scene
         from langflash_core.scene.edited import there
-        from langflash_core.scene.joining import append_part
 
         progress("looking", 0.1)
         own, marks = self.info, self.marks
@@ -54,38 +49,28 @@ class FillHole(Job):
         gone = preview(shown, torch.from_numpy(marks.selected.rows()[: len(kept)][kept]), render, _EDGE)
         patch, rows = fill(shown, gone, render), np.zeros(marks.selected.count, bool)
         rows[np.flatnonzero(kept)] = gone.numpy()
-        info = describe_scene(append_part(there(own.scene, marks), patch), serial, own.name, own.path)
         taken = Mask.of(rows)
-        beyond = len(taken - marks.selected)
+        info, beyond = _with_part(self, patch, serial), len(taken - marks.selected)
         return Merged(own.serial, marks.there, info, own.name, taken, beyond=beyond)
 
 
 @dataclass(frozen=True)
-class CopyPart(Job):
+class CopyPart(OnShow):
     """The selection as it is shown, once more, in its own place: to be moved over what it is to cover."""
-
-    info: SceneInfo
-    marks: Marks = field(repr=False)
 
     def run(self, serial: int, progress: Callable[[str, float], None], cancelled: Asked) -> Merged:
         import torch
 
-        from langflash_core.scene.edited import there
-        from langflash_core.scene.joining import append_part
-
         own, marks = self.info, self.marks
         chosen = torch.from_numpy(np.flatnonzero(marks.selected.rows()))
         copies = own.memory.changed(marks).rows(chosen)
-        info = describe_scene(append_part(there(own.scene, marks), copies), serial, own.name, own.path)
-        return Merged(own.serial, marks.there, info, own.name, copied=True)
+        return Merged(own.serial, marks.there, _with_part(self, copies, serial), own.name, copied=True)
 
 
 @dataclass(frozen=True)
-class ClonePart(Job):
+class ClonePart(OnShow):
     """What lies round `source`, laid where a brush went over the picture's place, which has `size`."""
 
-    info: SceneInfo
-    marks: Marks = field(repr=False)
     source: Spot
     region: Region
     pose: Pose
@@ -98,7 +83,6 @@ class ClonePart(Job):
         from langflash_core.mending.cloning import clone
         from langflash_core.mending.looks import draw_scene
         from langflash_core.scene.edited import there
-        from langflash_core.scene.joining import append_part
 
         progress("looking", 0.1)
         own, marks = self.info, self.marks
@@ -108,7 +92,7 @@ class ClonePart(Job):
         copies, gone = clone(shown, visible, self.source, self._stroke(), render, fit=self.fit)
         rows = np.zeros(marks.selected.count, bool)
         rows[: len(gone)] = gone.numpy()
-        info = describe_scene(append_part(there(own.scene, marks), copies), serial, own.name, own.path)
+        info = _with_part(self, copies, serial)
         return Merged(own.serial, marks.there, info, own.name, Mask.of(rows), copied=True)
 
     def _stroke(self) -> "Stroke":
@@ -124,11 +108,9 @@ class ClonePart(Job):
 
 
 @dataclass(frozen=True)
-class SplitPart(Job):
+class SplitPart(OnShow):
     """A part of an answer with an atom of its own, which is denied the phrase."""
 
-    info: SceneInfo
-    marks: Marks = field(repr=False)
     rows: Mask = field(repr=False)
     text: str
 
@@ -146,11 +128,9 @@ class SplitPart(Job):
 
 
 @dataclass(frozen=True)
-class HidePart(Job):
+class HidePart(OnShow):
     """The scene as edited, with the selection hidden for good in Gaussians and photos."""
 
-    info: SceneInfo
-    marks: Marks = field(repr=False)
     how: str
     margin: float
 
@@ -172,6 +152,15 @@ class HidePart(Job):
         still = "" if own.path is None else f" {own.path.name} on the disk still shows it."
         said = f"Hidden: {count:,} Gaussians{photos}. Ctrl+Z brings it back until this is saved.{still}"
         return HiddenForGood(own.serial, marks, describe_scene(done, serial, own.name), said)
+
+
+def _with_part(job: OnShow, part: "Scene", serial: int) -> SceneInfo:
+    """The scene as far as it is there, and a part behind it."""
+    from langflash_core.scene.edited import there
+    from langflash_core.scene.joining import append_part
+
+    own = job.info
+    return describe_scene(append_part(there(own.scene, job.marks), part), serial, own.name, own.path)
 
 
 def _watched(

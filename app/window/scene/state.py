@@ -210,10 +210,10 @@ class Showing:
     """The scene's half of the state: the tray, the scene on show, how it is looked at, the work on it.
 
     aside: photos of the scene on show while those of a new room are in the tray. choosing: the best pair is
-    being looked for. rooms: scenes that were on show before, the last one first. dropped: photos while it is
-    asked where they belong. pending: commands that wait for an answer about unsaved edits. view: of the photo
-    stood at, if any. hold: the hand on the picture. compare: where the photo begins, 0 to 1 across the
-    picture; None: not compared.
+    being looked for. rooms: scenes that were on show before, the last one first. dropped: photos, or a scene,
+    while it is asked where they belong. pending: commands that wait for an answer about unsaved edits. view:
+    of the photo stood at, if any. hold: the hand on the picture. compare: where the photo begins, 0 to 1
+    across the picture; None: not compared.
     unfinished: photos on which work was begun and kept. taken_out: what the tray had before.
     unhidden: the scene on show as it was before something in it was hidden for good, until that is saved;
     shown_by: files of scenes that show what was hidden in it by then. mute: the scene on show as it was
@@ -241,17 +241,22 @@ class Showing:
     taken_out: TakenOut | None = None
 
     @property
+    def paths(self) -> tuple[Path, ...]:
+        """Of the photos in the tray."""
+        return tuple(photo.path for photo in self.photos)
+
+    @property
     def num_taken_out(self) -> int:
         """Photos that were taken out of the tray and can be put back: nothing was done to it since."""
         taken = self.taken_out
-        if taken is None or self.job is not None or {photo.path for photo in self.photos} != set(taken.left):
+        if taken is None or self.job is not None or {*self.paths} != {*taken.left}:
             return 0
         return len(taken.photos) - len(taken.left)
 
     @property
     def goes_on(self) -> bool:
         """Whether work on the photos in the tray goes on from where it was."""
-        return bool(self.unfinished) and tuple(photo.path for photo in self.photos) == self.unfinished
+        return bool(self.unfinished) and self.paths == self.unfinished
 
 
 NO_SCENE = Showing()

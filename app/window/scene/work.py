@@ -4,7 +4,7 @@ Heavy imports wait until they are needed: the window makes these requests before
 """
 
 import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -14,7 +14,7 @@ import numpy as np
 
 from langflash_core.base.detail import DEFAULT_DETAIL
 from langflash_core.base.picture_files import STORED, opened_picture
-from langflash_core.errors import ImageError, LangFlashError, SceneFileError
+from langflash_core.errors import ImageError, SceneFileError
 from langflash_core.geometry.poses import Vector, from_view
 from langflash_core.geometry.reach import median_reach
 from langflash_core.images.still_names import film_of, shown_name
@@ -110,17 +110,22 @@ class LoadScene(Job):
         if self.edits is not None and not (self.edits.is_file() and self.path.is_file()):
             raise SceneFileError("the saved progress is gone; another window is using it")
         scene = read_scene(self.path)
-        if self.edits is not None:
-            return SceneArrived(_restored(describe_scene(scene, serial, ""), self.edits), self.alone)
-        return SceneArrived(describe_scene(scene, serial, self.path.name, self.path), self.alone)
+        info = describe_scene(scene, serial, self.path.name, self.path)
+        return SceneArrived(info if self.edits is None else _restored(info, self.edits), self.alone)
 
 
 @dataclass(frozen=True)
-class JoinScenes(Job):
-    """Read a scene file and put what it holds beside the scene on show, as far as that is there."""
+class OnShow(Job):
+    """Makes another scene of the one on show, as `marks` edited it."""
 
     info: SceneInfo
     marks: Marks = field(repr=False)
+
+
+@dataclass(frozen=True)
+class JoinScenes(OnShow):
+    """Read a scene file and put what it holds beside the scene on show, as far as that is there."""
+
     path: Path
 
     def run(self, serial: int, progress: Callable[[str, float], None], cancelled: Asked) -> Merged:
@@ -137,11 +142,9 @@ class JoinScenes(Job):
 
 
 @dataclass(frozen=True)
-class PutInPhotos(Job):
+class PutInPhotos(OnShow):
     """The scene on show, as it is edited, with a layer of each of these photos."""
 
-    info: SceneInfo
-    marks: Marks = field(repr=False)
     photos: tuple[Path, ...]
     networks: Networks = field(default_factory=Networks, repr=False, compare=False)
 
@@ -395,7 +398,7 @@ class FindPair(Task):
     def run(self, stopping: Asked) -> Iterator[Command]:
         from langflash_core.pipeline import best_pair
 
-        try:
-            yield PairChosen(self.paths, best_pair(self.paths, cancelled=stopping))
-        except LangFlashError as error:
-            yield ChoosingFailed(str(error))
+        yield PairChosen(self.paths, best_pair(self.paths, cancelled=stopping))
+
+    def failed(self, sentence: str) -> Iterable[Command]:
+        return (ChoosingFailed(sentence),)

@@ -50,7 +50,7 @@ class AddStop:
         prompt = state.asking.active_prompt
         phrase = prompt.text.strip()[: TOURS.longest_text] if prompt and state.scene.mode.answers else ""
         stop = Stop(f"Stop {number}", state.scene.pose, phrase=phrase)
-        after = _with_tour(state, f"Add stop {number}", lambda: tour.with_stop(stop))
+        after = _with_tour(state, f"Add stop {number}", lambda tour: tour.with_stop(stop))
         return after.with_touring(open=True, place=len(after.tour.stops) - 1)
 
 
@@ -64,13 +64,10 @@ class ChangeStop:
     here: bool = False
 
     def apply(self, state: State) -> State:
-        tour = state.tour
-        changes: dict[str, Any] = {} if self.name is None else {"name": self.name}
-        changes |= {} if self.text is None else {"text": self.text}
-        changes |= {"pose": state.scene.pose} if self.here else {}
-        return _with_tour(
-            state, f"Change stop {self.place + 1}", lambda: tour.changed_stop(self.place, **changes)
-        )
+        told = {"name": self.name, "text": self.text, "pose": state.scene.pose if self.here else None}
+        changes: dict[str, Any] = {name: value for name, value in told.items() if value is not None}
+        label = f"Change stop {self.place + 1}"
+        return _with_tour(state, label, lambda tour: tour.changed_stop(self.place, **changes))
 
 
 @dataclass(frozen=True)
@@ -81,8 +78,8 @@ class MoveStop:
     to: int
 
     def apply(self, state: State) -> State:
-        tour = state.tour
-        return _with_tour(state, f"Move stop {self.place + 1}", lambda: tour.moved_stop(self.place, self.to))
+        label = f"Move stop {self.place + 1}"
+        return _with_tour(state, label, lambda tour: tour.moved_stop(self.place, self.to))
 
 
 @dataclass(frozen=True)
@@ -92,8 +89,8 @@ class RemoveStop:
     place: int
 
     def apply(self, state: State) -> State:
-        tour = state.tour
-        after = _with_tour(state, f"Remove stop {self.place + 1}", lambda: tour.without_stop(self.place))
+        label = f"Remove stop {self.place + 1}"
+        after = _with_tour(state, label, lambda tour: tour.without_stop(self.place))
         return after.with_touring(place=-1).with_filming(tour=None)
 
 
@@ -104,10 +101,8 @@ class StartAt:
     name: str
 
     def apply(self, state: State) -> State:
-        tour = state.tour
-        return _with_tour(
-            state, f"Start at {self.name or 'the first photo'}", lambda: tour.started(self.name)
-        )
+        label = f"Start at {self.name or 'the first photo'}"
+        return _with_tour(state, label, lambda tour: tour.started(self.name))
 
 
 @dataclass(frozen=True)
@@ -120,9 +115,8 @@ class AddNote:
     phrase: str = ""
 
     def apply(self, state: State) -> State:
-        tour = state.tour
         note = Note(self.text[: TOURS.longest_text], self.at, self.to, self.phrase)
-        return _with_tour(state, "Pin a note", lambda: tour.with_note(note)).with_touring(open=True)
+        return _with_tour(state, "Pin a note", lambda tour: tour.with_note(note)).with_touring(open=True)
 
 
 @dataclass(frozen=True)
@@ -133,12 +127,10 @@ class ChangeNote:
     text: str
 
     def apply(self, state: State) -> State:
-        tour = state.tour
-        notes = list(tour.notes)
+        notes = list(state.tour.notes)
         notes[self.place] = replace(notes[self.place], text=self.text)
-        return _with_tour(
-            state, f"Change note {self.place + 1}", lambda: check_tour(replace(tour, notes=tuple(notes)))
-        )
+        label = f"Change note {self.place + 1}"
+        return _with_tour(state, label, lambda tour: check_tour(replace(tour, notes=tuple(notes))))
 
 
 @dataclass(frozen=True)
@@ -148,8 +140,8 @@ class RemoveNote:
     place: int
 
     def apply(self, state: State) -> State:
-        tour = state.tour
-        return _with_tour(state, f"Remove note {self.place + 1}", lambda: tour.without_note(self.place))
+        label = f"Remove note {self.place + 1}"
+        return _with_tour(state, label, lambda tour: tour.without_note(self.place))
 
 
 @dataclass(frozen=True)
@@ -220,12 +212,12 @@ class AskNote:
         return asked(state, state.tour.notes[self.place].phrase)
 
 
-def _with_tour(state: State, label: str, make: Callable[[], Tour]) -> State:
+def _with_tour(state: State, label: str, make: Callable[[Tour], Tour]) -> State:
     """Another tour, as an edit; the same and a sentence where it cannot be."""
     marks = state.editing.marks
     if marks is None:
         return state
     try:
-        return with_edit(state, label, replace(marks, tour=told_tour(make())))
+        return with_edit(state, label, replace(marks, tour=told_tour(make(state.tour))))
     except InputError as problem:
         return Notify(str(problem)[0].upper() + str(problem)[1:] + ".").apply(state)

@@ -19,27 +19,25 @@ from . import commands as tour
 
 _SIZE = (330.0, 400.0)  # design pixels, the height at most
 _BELOW = 150.0  # of the axes and the key frames, which are above
-_MARGIN, _BUTTON = 12.0, 30.0
+_BUTTON, _LEAST = 30.0, 120.0  # the second: of the height
 _FAINT = 0.35  # how much is seen of a note that is behind a surface
 _LETTERS = 40  # of a note that are shown in the picture
 
 
 def button(state: State) -> list[do.Command]:
     """Opens the tour, or closes it."""
-    imgui.begin_disabled(state.scene.info is None)
-    label = f"{fa.ICON_FA_SIGNS_POST}##tour"
-    pressed = widgets.primary_button(label) if state.touring.open else imgui.button(label)
-    imgui.end_disabled()
-    widgets.tooltip("Guided tour: named stops and notes, for films and web pages")
+    label, on, there = f"{fa.ICON_FA_SIGNS_POST}##tour", state.touring.open, state.scene.info is not None
+    tip = "Guided tour: named stops and notes, for films and web pages"
+    issued: list[do.Command] = [*widgets.press(label, tour.ShowTour(not on), tip, able=there, on=on)]
     imgui.same_line()
-    return [tour.ShowTour(not state.touring.open)] if pressed else []
+    return issued
 
 
 def draw(state: State, look: Look, place: ImVec2, size: ImVec2) -> list[do.Command]:
     """The window over the picture's right side, or over the panel where that is narrow."""
     if not state.touring.open:
         return []
-    corner, extent = boxes.over_panel(place, size, look) or _over_picture(look, place, size)
+    corner, extent = boxes.opens_at(place, size, size.y, look, _BELOW, _SIZE, _LEAST)
     imgui.set_next_window_pos(corner, imgui.Cond_.appearing)
     imgui.set_next_window_size(extent, imgui.Cond_.appearing)
     imgui.push_style_var(imgui.StyleVar_.window_rounding, look.px(8))
@@ -60,32 +58,20 @@ def draw(state: State, look: Look, place: ImVec2, size: ImVec2) -> list[do.Comma
     return issued if kept else [*issued, tour.ShowTour(False)]
 
 
-def _over_picture(look: Look, place: ImVec2, size: ImVec2) -> tuple[ImVec2, ImVec2]:
-    """Its corner and its size where it opens."""
-    top, margin = place.y + look.px(_BELOW), look.px(_MARGIN)
-    height = min(look.px(_SIZE[1]), max(place.y + size.y - top - margin, look.px(120)))
-    width = min(look.px(_SIZE[0]), size.x - 2 * margin)
-    return ImVec2(place.x + size.x - margin - width, top), ImVec2(width, height)
-
-
 def _bar(state: State, look: Look) -> list[do.Command]:
     issued: list[do.Command] = []
     wide, playing = ImVec2(look.px(_BUTTON), 0), state.filming.tour is not None
-    imgui.begin_disabled(not state.tour.stops)
-    for icon, tip, command in (
-        (fa.ICON_FA_BACKWARD_STEP, "Previous stop  (PgUp)", tour.Step(-1)),
-        (fa.ICON_FA_STOP if playing else fa.ICON_FA_PLAY, "Play the tour",
-         film.StopTour() if playing else tour.Play()),
-        (fa.ICON_FA_FORWARD_STEP, "Next stop  (PgDn)", tour.Step(1)),
-    ):  # fmt: skip
-        if imgui.button(f"{icon}##{tip}", wide):
-            issued.append(command)
-        widgets.tooltip(tip)
+    there = bool(state.tour.stops)
+    play, flight = (fa.ICON_FA_STOP, film.StopTour()) if playing else (fa.ICON_FA_PLAY, tour.Play())
+    for icon, command, tip in (
+        (fa.ICON_FA_BACKWARD_STEP, tour.Step(-1), "Previous stop  (PgUp)"),
+        (play, flight, "Play the tour"),
+        (fa.ICON_FA_FORWARD_STEP, tour.Step(1), "Next stop  (PgDn)"),
+    ):
+        issued += widgets.press(f"{icon}##{tip}", command, tip, wide, there)
         imgui.same_line(0, look.px(4))
-    imgui.end_disabled()
-    if widgets.primary_button(f"{fa.ICON_FA_PLUS}  Add this view"):
-        issued.append(tour.AddStop())
-    widgets.tooltip("Add this view as the next stop, with the active phrase")
+    tip = "Add this view as the next stop, with the active phrase"
+    issued += widgets.press(f"{fa.ICON_FA_PLUS}  Add this view", tour.AddStop(), tip, on=True)
     return issued
 
 
@@ -95,9 +81,8 @@ def _stop(state: State, number: int, stop: Stop, look: Look) -> list[do.Command]
     imgui.push_id(f"stop {number}")
     wide, gap = ImVec2(look.px(_BUTTON), 0), look.px(4)
     here = number == state.touring.place
-    if (widgets.primary_button if here else imgui.button)(f"{number + 1}##go", wide):
-        issued.append(tour.GoToStop(number))
-    widgets.tooltip(f'Fly there, and ask "{stop.phrase}"' if stop.phrase else "Fly there")
+    tip = f'Fly there, and ask "{stop.phrase}"' if stop.phrase else "Fly there"
+    issued += widgets.press(f"{number + 1}##go", tour.GoToStop(number), tip, wide, on=here)
     imgui.same_line(0, gap)
     imgui.set_next_item_width(imgui.get_content_region_avail().x - 4 * (look.px(_BUTTON) + gap))
     _, name = imgui.input_text("##name", stop.name)
@@ -114,12 +99,8 @@ def _stop(state: State, number: int, stop: Stop, look: Look) -> list[do.Command]
         (fa.ICON_FA_TRASH, "Remove it", tour.RemoveStop(number), True),
     ):  # fmt: skip
         imgui.same_line(0, gap)
-        imgui.begin_disabled(not can)
         marked = start and icon == fa.ICON_FA_FLAG
-        if (widgets.primary_button if marked else imgui.button)(f"{icon}##{icon}", wide):
-            issued.append(command)
-        imgui.end_disabled()
-        widgets.tooltip(tip)
+        issued += widgets.press(f"{icon}##{icon}", command, tip, wide, can, marked)
     if here:
         issued += _told(number, stop)
     imgui.pop_id()
@@ -146,12 +127,9 @@ def _note(state: State, number: int, note: Note, look: Look) -> list[do.Command]
     issued: list[do.Command] = []
     imgui.push_id(f"note {number}")
     wide, gap = ImVec2(look.px(_BUTTON), 0), look.px(4)
-    imgui.begin_disabled(not note.phrase)
     icon = fa.ICON_FA_RULER if note.to else fa.ICON_FA_THUMBTACK
-    if imgui.button(f"{icon}##ask", wide):
-        issued.append(tour.AskNote(number))
-    imgui.end_disabled()
-    widgets.tooltip(f'Ask "{note.phrase}"' if note.phrase else _measured(state, note) or "No phrase")
+    tip = f'Ask "{note.phrase}"' if note.phrase else _measured(state, note) or "No phrase"
+    issued += widgets.press(f"{icon}##ask", tour.AskNote(number), tip, wide, able=bool(note.phrase))
     imgui.same_line(0, gap)
     imgui.set_next_item_width(imgui.get_content_region_avail().x - look.px(_BUTTON) - gap)
     _, text = imgui.input_text("##text", note.text)
@@ -160,9 +138,7 @@ def _note(state: State, number: int, note: Note, look: Look) -> list[do.Command]
         issued += [tour.ChangeNote(number, text), *told]
     widgets.whole(note.text, "")
     imgui.same_line(0, gap)
-    if imgui.button(f"{fa.ICON_FA_TRASH}##gone", wide):
-        issued.append(tour.RemoveNote(number))
-    widgets.tooltip("Remove it")
+    issued += widgets.press(f"{fa.ICON_FA_TRASH}##gone", tour.RemoveNote(number), "Remove it", wide)
     imgui.pop_id()
     return issued
 
@@ -195,15 +171,7 @@ def draw_notes(state: State, look: Look, corner: ImVec2, size: ImVec2) -> None:
             continue
         middle = ImVec2(sum(p.x for p in points) / len(points), sum(p.y for p in points) / len(points))
         text = note.text if len(note.text) <= _LETTERS else note.text[: _LETTERS - 1] + "…"
-        _caption(look, middle, " · ".join(filter(None, (text, _measured(state, note)))))
+        text = " · ".join(filter(None, (text, _measured(state, note))))
+        top = middle.y - imgui.calc_text_size(text).y / 2 - look.px(3)
+        widgets.caption(text, ImVec2(middle.x + look.px(10), top), look, shade=205)
     canvas.pop_clip_rect()
-
-
-def _caption(look: Look, at: ImVec2, text: str) -> None:
-    """Words on a dark ground, right of a point."""
-    canvas, extent = imgui.get_window_draw_list(), imgui.calc_text_size(text)
-    corner = ImVec2(at.x + look.px(10), at.y - extent.y / 2 - look.px(3))
-    end = ImVec2(corner.x + extent.x + look.px(14), corner.y + extent.y + look.px(6))
-    canvas.add_rect_filled(corner, end, imgui.IM_COL32(14, 16, 20, 205), look.px(5))
-    ink = widgets.u32(theme.DARK.TEXT)
-    canvas.add_text(ImVec2(corner.x + look.px(7), corner.y + look.px(3)), ink, text)

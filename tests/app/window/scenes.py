@@ -3,6 +3,7 @@ states that show it."""
 
 import io
 import math
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -84,6 +85,25 @@ def after(state: State, *commands: Command) -> State:
 def told(state: State) -> str:
     """The newest message."""
     return state.toasts[-1].text
+
+
+def with_info(state: State, **changes) -> State:
+    """The state with other facts of the scene on show."""
+    assert state.scene.info is not None
+    return state.with_scene(info=replace(state.scene.info, **changes))
+
+
+def with_splats(state: State, **changes) -> State:
+    """The state with other fields of the scene itself."""
+    assert state.scene.info is not None
+    return with_info(state, scene=replace(state.scene.info.scene, **changes))
+
+
+def of_photos(state: State) -> State:
+    """A scene that knows which photo made what: the first made all."""
+    assert state.scene.info is not None
+    count = len(state.scene.info.scene.gaussians)
+    return with_splats(state, view_ids=torch.zeros(count, dtype=torch.int64))
 
 
 VIEWS = (Pose(), Pose(Vector(0.3, 0.0, 0.0)))

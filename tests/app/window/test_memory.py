@@ -7,8 +7,7 @@ from pathlib import Path
 import pytest
 
 from app.window.commands import Measured, Notify, Tick
-from app.window.effects import Hands
-from app.window.rest import REST_SECONDS, RestEffects
+from app.window.effects import REST_SECONDS, Hands, RestEffects
 from app.window.state import State, Stats
 from langflash_core.language.spaces import language_space
 from langflash_core.scene.file import save

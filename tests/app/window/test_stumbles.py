@@ -20,7 +20,6 @@ from app.window.editing.panels import pointing as card_panel
 from app.window.editing.panels import ruler, tools
 from app.window.editing.state import Card, Editing, Reading, Tool
 from app.window.exporting import commands as export
-from app.window.exporting import order
 from app.window.exporting.state import Running
 from app.window.filming import commands as film
 from app.window.frame import dialogs, keys, layout
@@ -41,12 +40,9 @@ from langflash_core.base import outputs
 from langflash_core.network.guided import GuidedDepthNet
 from langflash_core.network.pointmaps import PointMapNet
 from langflash_core.reconstruction.stages import STAGES
-from langflash_core.scene.edited import first_marks
-from langflash_core.scene.edits import History
-from langflash_core.scene.mask import Mask
 from tests.app.window.headless import box, context, frames, look
 from tests.app.window.items import Items
-from tests.app.window.scenes import after, shown_scene
+from tests.app.window.scenes import after, shown_scene, with_info
 
 SIZE = (1280, 800)
 PATIENCE = 60.0  # seconds
@@ -126,7 +122,8 @@ def test_a_double_click_walks_into_one_folder(items: Items) -> None:
     assert hands.of(opening.LookInto)[1:] == [opening.LookInto(Path("/home/Pictures/toys"))]
 
 
-def test_keys_walk_through_folders_and_choose_photos() -> None:
+def test_keys_walk_through_folders_and_open_what_the_space_bar_has_chosen() -> None:
+    """No way leads from the photos to the button by arrows alone that does not pass "Cancel"."""
     photos = (Path("/home/Pictures/a.png"), Path("/home/Pictures/b.png"))
     states = [browsing(Folder(Path("/home"), (Path("/home/Pictures"),)))]
     hands = Hands(lambda seen: browser.draw(states[-1], seen), bare=True)
@@ -142,15 +139,18 @@ def test_keys_walk_through_folders_and_choose_photos() -> None:
         states.append(browsing(Folder(Path("/home/Pictures"), (), photos)))
         hands.frames(4)
         hands.key(imgui.Key.space)
-    assert hands.of(opening.Choose) == [opening.Choose(photos[0])]
+        assert hands.of(opening.Choose) == [opening.Choose(photos[0])]
+        states.append(apply(states[-1], opening.Choose(photos[0])))
+        hands.key(imgui.Key.right_arrow)
+        hands.key(imgui.Key.enter)
+    assert hands.of(show.OpenPaths) == [show.OpenPaths(tuple(map(str, photos)))]
+    assert hands.of(ShowDialog) == []
 
 
 def test_a_card_is_asked_again_once_its_thing_has_another_name(items: Items) -> None:
     state = shown_scene()
-    assert state.scene.info is not None
-    history = History(first_marks(state.scene.info.scene))
     card = Card(Reading((300, 200), None, 1.0, ((1, 1.0),)), (("tv stand", 0.93),))
-    state = state.with_editing(history=history, card=card, names=(("a",),) * 3)
+    state = state.with_editing(card=card, names=(("a",),) * 3)
     hands = Hands(lambda seen: card_panel.draw(state, seen, PLACE, ROOM))
     with context(SIZE):
         hands.frames(4)
@@ -160,28 +160,6 @@ def test_a_card_is_asked_again_once_its_thing_has_another_name(items: Items) -> 
         hands.key(imgui.Key.enter)
     assert hands.of(edit.RenameAtom) == [edit.RenameAtom(1, "armchair")]
     assert hands.of(point.Ask) == [point.Ask((300, 200))]
-
-
-def test_enter_opens_what_the_space_bar_has_chosen() -> None:
-    """No way leads from the photos to the button by arrows alone that does not pass "Cancel"."""
-    photos = (Path("/home/Pictures/a.png"), Path("/home/Pictures/b.png"))
-    states = [browsing(Folder(Path("/home/Pictures"), (), photos))]
-    hands = Hands(lambda seen: browser.draw(states[-1], seen), bare=True)
-    with context(SIZE):
-        imgui.get_io().config_flags |= imgui.ConfigFlags_.nav_enable_keyboard
-        hands.frames(4)
-        for _ in range(10):
-            hands.key(imgui.Key.down_arrow)
-            hands.key(imgui.Key.space)
-            if hands.of(opening.Choose):
-                break
-        taken = hands.of(opening.Choose)[0]
-        states.append(apply(states[-1], taken))
-        hands.key(imgui.Key.right_arrow)
-        hands.key(imgui.Key.enter)
-    assert taken == opening.Choose(photos[0])
-    assert hands.of(show.OpenPaths) == [show.OpenPaths(tuple(map(str, photos)))]
-    assert hands.of(ShowDialog) == []
 
 
 @pytest.mark.parametrize("asker", [Dialog.EXPORT, Dialog.SAVE])
@@ -230,9 +208,7 @@ def test_the_kinds_of_export_are_where_they_were_when_the_dialog_opens_again(ite
 
 def test_buttons_of_a_selection_stay_as_it_grows(items: Items, monkeypatch) -> None:
     places = set()
-    state = shown_scene()
-    assert state.scene.info is not None
-    state = state.with_scene(info=replace(state.scene.info, num_gaussians=92_440))
+    state = with_info(shown_scene(), num_gaussians=92_440)
     for count in (1, 22, 333, 4_444, 92_440):
         monkeypatch.setattr(Editing, "num_selected", property(lambda editing, count=count: count))
         with context(SIZE):
@@ -298,21 +274,13 @@ def test_arrows_with_ctrl_lead_to_no_other_control(ctrl: bool) -> None:
 
 
 def test_a_colour_is_chosen_by_the_key_that_began() -> None:
-    state = shown_scene()
-    assert state.scene.info is not None
-    marks = replace(
-        first_marks(state.scene.info.scene), selected=Mask.first(len(state.scene.info.scene.gaussians), 500)
-    )
-    state = state.with_editing(history=History(marks))
-    entry = named("Recolour the selection")
-    begin = entry.make(state)
-    assert begin is not None
-    state = apply(state, begin)
-    assert state.editing.tint is not None
-    end = entry.make(state)
-    assert end is not None
-    state = apply(state, end)
-    assert state.editing.tint is None and state.editing.marks is not None
+    state, entry = after(shown_scene(), edit.SelectAll()), named("Recolour the selection")
+    for tinting in (True, False):
+        command = entry.make(state)
+        assert command is not None
+        state = apply(state, command)
+        assert (state.editing.tint is not None) == tinting
+    assert state.editing.marks is not None
     assert [type(change).__name__ for change in state.editing.marks.changes] == ["Recoloured"]
 
 
@@ -322,22 +290,7 @@ def measuring() -> State:
     return state.with_editing(tool=Tool.RULER, ruler=spots)
 
 
-def test_the_rulers_line_is_below_its_field() -> None:
-    """On the picture, not before all panels."""
-    state, before = measuring(), list[int]()
-
-    def draw(seen: Look) -> list[Command]:
-        issued = ruler.draw(state, seen, PLACE, ROOM)
-        before.append(imgui.get_foreground_draw_list().vtx_buffer.size())
-        return issued
-
-    with context(SIZE):
-        Hands(draw).frames(4)
-        box("##ruler")  # is there
-    assert before[-1] == 0
-
-
-@pytest.mark.parametrize("mark", ["asked", "card", "region"])
+@pytest.mark.parametrize("mark", ["asked", "card", "region", "ruler"])
 def test_marks_on_the_picture_are_below_a_dialog(mark: str) -> None:
     """A dot of the place that was asked about shone through the list of scenes to merge."""
     state, before = replace(shown_scene(), dialog=Dialog.HELP), list[int]()
@@ -346,6 +299,7 @@ def test_marks_on_the_picture_are_below_a_dialog(mark: str) -> None:
         "asked": replace(state.editing, asked=place),
         "card": replace(state.editing, card=Card(Reading(place), ())),
         "region": replace(state.editing, tool=Tool.BOX, drag=path),
+        "ruler": measuring().editing,
     }
     shown = replace(look(), picture=SimpleNamespace(glo=1))  # pyright: ignore[reportArgumentType]
 
@@ -444,44 +398,24 @@ def test_a_dialog_stays_in_the_window() -> None:
             assert left >= 0 and top >= 0 and right <= SIZE[0] and bottom <= SIZE[1]
 
 
-def test_an_export_moves_nothing_in_the_panel(items: Items, monkeypatch) -> None:
+def test_an_export_that_begins_moves_nothing_in_the_panel_and_takes_no_keys(
+    items: Items, monkeypatch
+) -> None:
+    """Enter would stop it."""
     state = shown_scene()
     running = state.with_exporting(running=Running(Path("mask.png")))
     monkeypatch.setattr(layout.canvas, "draw", lambda state, look: [])  # needs OpenGL
     places = []
     with context(SIZE):
+        imgui.get_io().config_flags |= imgui.ConfigFlags_.nav_enable_keyboard
         for each in (state, running):
             hands = Hands(lambda seen, each=each: layout.draw_all(each, seen)[0])
             hands.frames(6)
             places.append(middle(items, "##text"))
         assert any(name.endswith("Stop the export") for name in items.now())
-    assert places[0] == places[1]
-
-
-def test_a_film_follows_the_key_frames_where_there_are_some() -> None:
-    state = after(shown_scene(), export.ShowExport())
-    state = after(state, export.EditForm(replace(state.exporting.form, what=outputs.VIDEO)))
-    assert order.way(state) == "photos"
-    state = after(state, film.AddKey(), film.AddKey())
-    assert len(state.keys) == 2 and order.way(state) == "keys"
-    state = after(state, export.EditForm(replace(state.exporting.form, way="orbit")))
-    assert order.way(state) == "orbit"
-
-
-def test_an_export_that_begins_takes_no_keys(monkeypatch) -> None:
-    """Enter would stop it."""
-    state = shown_scene()
-    running = state.with_exporting(running=Running(Path("mask.png")))
-    states = [state]
-    monkeypatch.setattr(layout.canvas, "draw", lambda state, look: [])  # needs OpenGL
-    hands = Hands(lambda seen: layout.draw_all(states[-1], seen)[0])
-    with context(SIZE):
-        imgui.get_io().config_flags |= imgui.ConfigFlags_.nav_enable_keyboard
-        hands.frames(6)
-        states.append(running)
-        hands.frames(6)
         window = imgui.get_current_context().nav_window
         assert window is None or window.name != "##export"
+    assert places[0] == places[1]
 
 
 def test_a_film_begins_with_a_button(items: Items) -> None:

@@ -74,6 +74,21 @@ def showing(scene: Scene, serial: int = 1, **changes) -> State:
     return shown_scene().with_scene(info=replace(info, serial=serial, scene=scene), **changes)
 
 
+def living(
+    viewport: Viewport, state: State, governor: type[Governor] | None = None, count: int = 300, turns: int = 0
+) -> Iterator[State]:
+    """Frames of 50 ms each, in the first `turns` of which a hand orbits. governor: of every frame."""
+    for turn in range(count):
+        if turns:
+            state = state.with_scene(pose=orbit(START, 0.02 * min(turn, turns), 0.0))
+        if governor is not None and viewport.picture is not None:
+            viewport.picture.governor = governor(slow=True)
+        state = replace(state, now=state.now + 0.05)
+        viewport.update(state, SIZE, touched=state.now if turn < turns else 0.0)
+        yield state
+        time.sleep(0.01)
+
+
 def on_the_processor(viewport: Viewport) -> ProcessorPicture:
     """Its picture; the test ends here where OpenGL draws all pictures itself."""
     if not isinstance(viewport.picture, ProcessorPicture):
@@ -87,19 +102,15 @@ def test_a_picture_comes_to_rest_in_full(viewport) -> None:
     scene = spoken_room()
     state = showing(scene, mode=pictures.HEAT)
     viewport.set_scene(1, scene)
-    picture = on_the_processor(viewport)
+    on_the_processor(viewport)
     viewport.ask((0,), compile_query(scene, space, list(PHRASES[:1])))
     plans: list[Plan] = []
-    for _ in range(300):
-        picture.governor = Stubborn(slow=True)
-        state = replace(state, now=state.now + 0.05)
-        viewport.update(state, SIZE, touched=0.0)
+    for _ in living(viewport, state, Stubborn):
         plan = getattr(viewport.drawn, "plan", None)
         if plan is not None and (not plans or plans[-1] != plan):
             plans.append(plan)
         if plan == Plan(Kind.MAPS) and not viewport.settling:
             break
-        time.sleep(0.01)
     assert plans[-1] == Plan(Kind.MAPS)
     assert len(plans) <= 3, "the moving one, and what follows it at rest"
 
@@ -111,14 +122,10 @@ def test_what_moves_in_full_size_is_followed_by_the_exact_picture(viewport) -> N
     viewport.set_scene(1, scene)
     picture = on_the_processor(viewport)
     plans = []
-    for _ in range(300):
-        picture.governor = Quick(slow=True)
-        state = replace(state, now=state.now + 0.05)
-        viewport.update(state, SIZE, touched=0.0)
+    for _ in living(viewport, state, Quick):
         plans.append(getattr(viewport.drawn, "plan", None))
         if viewport.whole:
             break
-        time.sleep(0.01)
     still = picture.stills.shown
     assert Plan(Kind.COLOUR) in plans[:-1], "the moving one came first"
     assert still is not None and (still.camera.width, still.camera.height) == SIZE
@@ -131,10 +138,7 @@ def test_pictures_that_move_and_that_rest_are_in_the_light_of_their_place(viewpo
     state = showing(scene)
     drawn = set()
     viewport.set_scene(1, scene)
-    for turn in range(300):
-        pose = orbit(START, 0.02 * min(turn, 5), 0.0)
-        state = replace(state.with_scene(pose=pose), now=state.now + 0.05)
-        viewport.update(state, SIZE, touched=state.now if turn < 5 else 0.0)
+    for turn, _ in enumerate(living(viewport, state, turns=5)):
         easel = None if viewport.picture is None else viewport.picture.easel
         if easel is not None and easel.camera is not None and viewport.drawn is not None:
             expected = lit_camera(scene, replace(easel.camera, light=None)).light
@@ -143,7 +147,6 @@ def test_pictures_that_move_and_that_rest_are_in_the_light_of_their_place(viewpo
             drawn.add(getattr(viewport.drawn, "plan", None))
         if turn > 5 and viewport.whole and not viewport.settling:
             break
-        time.sleep(0.01)
     assert drawn & {Plan(Kind.COLOUR), Plan(Kind.MAPS)}, "the one at rest, whichever the machine has time for"
 
 
@@ -153,15 +156,11 @@ def test_a_scene_begins_without_the_targets_of_the_one_before(viewport) -> None:
     state = showing(scene, mode=pictures.HEAT)
     viewport.set_scene(1, scene)
     viewport.ask((0,), compile_query(scene, language_space("minilm"), list(PHRASES[:1])))
-    for _ in range(3):
-        state = replace(state, now=state.now + 0.05)
-        viewport.update(state, SIZE, touched=0.0)
-    view = viewport._made().canvas.view(viewport.picture_size)
+    *_, state = living(viewport, state, count=3)
+    view = viewport._made().canvas.view(viewport.stats().picture_size)
     viewport.set_scene(2, other)
     held = viewport._made().canvas.holds(view)
-    for _ in range(3):
-        state = replace(showing(other, 2, mode=pictures.HEAT), now=state.now + 0.05)
-        viewport.update(state, SIZE, touched=0.0)
+    list(living(viewport, replace(showing(other, 2, mode=pictures.HEAT), now=state.now), count=3))
     drawn = viewport.texture
     assert not held and drawn is not None
 
@@ -171,17 +170,14 @@ def test_a_changed_scene_shows_its_last_picture_until_the_next(viewport) -> None
     scene, other = spoken_room(), spoken_room()
     state = showing(scene).with_asking(prompts=())
     viewport.set_scene(1, scene)
-    while viewport.texture is None:
-        state = replace(state, now=state.now + 0.05)
-        viewport.update(state, SIZE, touched=0.0)
+    state = next(each for each in living(viewport, state) if viewport.texture is not None)
+    assert viewport.texture is not None
     before = viewport.texture.read()
     viewport.set_scene(2, other, changed=True)
     kept = viewport.texture
     assert kept is not None and kept.read() == before
     assert viewport.seen() is None, "what was hidden for good may be in it"
-    while viewport.seen() is None:
-        state = replace(state, now=state.now + 0.05)
-        viewport.update(state, SIZE, touched=0.0)
+    next(each for each in living(viewport, state) if viewport.seen() is not None)
     assert viewport.texture is not kept and not hasattr(kept.mglo, "use")
     viewport.set_scene(3, scene)
     assert viewport.texture is None, "another scene's would mislead"
@@ -201,26 +197,15 @@ def test_a_picture_that_could_not_be_drawn_is_told_and_tried_again(viewport, mon
     scene = spoken_room()
     state = showing(scene)
     viewport.set_scene(1, scene)
-    picture = on_the_processor(viewport)
-
-    def live(seconds: float, until) -> None:
-        nonlocal state
-        for _ in range(300):
-            if until():
-                return
-            picture.governor = Stubborn(slow=True)
-            state = replace(state, now=state.now + seconds)
-            viewport.update(state, SIZE, touched=0.0)
-            time.sleep(0.01)
-        raise AssertionError("nothing came of it")
-
-    live(0.05, lambda: viewport.failing)
+    on_the_processor(viewport)
+    state = next(each for each in living(viewport, state, Stubborn) if viewport.failing)
     assert len(tried) == 1
     wait = viewport.update(state, SIZE, touched=0.0)
     assert 0 < wait <= RETRY_SECONDS and not viewport.settling, "not at once, and not never"
     broken[0] = False
-    live(RETRY_SECONDS, lambda: getattr(viewport.drawn, "plan", Plan(Kind.FAST, 0.5)).scale == 1.0)
-    assert not viewport.failing
+    state = replace(state, now=state.now + RETRY_SECONDS)
+    wanted = lambda: getattr(viewport.drawn, "plan", Plan(Kind.FAST, 0.5)).scale == 1.0  # noqa: E731
+    assert any(wanted() for _ in living(viewport, state, Stubborn)) and not viewport.failing
 
 
 def test_only_the_picture_on_show_is_scored(viewport) -> None:
@@ -231,14 +216,11 @@ def test_only_the_picture_on_show_is_scored(viewport) -> None:
     query = compile_query(scene, space, list(PHRASES[:1]))
     viewport.set_scene(1, scene)
     viewport.ask((0,), query, state.asking.revision)
-    view = None
-    for _ in range(600):
-        state = replace(state, now=state.now + 0.05)
-        viewport.update(state, SIZE, touched=0.0)
+    view, frames = None, living(viewport, state, count=600)
+    for state in frames:
         view = viewport.view(state)
         if view is not None:
             break
-        time.sleep(0.01)
     assert view is not None and viewport.view(state) is None, "once"
     viewport.ask((0,), query, state.asking.revision)
     assert viewport.view(state.with_scene(pose=orbit(state.scene.pose, 0.2, 0.0))) is None, "of another place"
@@ -295,12 +277,9 @@ def test_a_scene_with_levels_moves_coarse_and_rests_whole(viewport, monkeypatch)
     for share in viewport.shares:
         viewport.thin(scene, share, Thinned(*thin_with_rows(scene, share)))
     assert picture.governor.ladder[2:4] == ((0.75, 0.625), (0.5, 0.625))
-    for _ in range(300):
-        state = replace(state, now=state.now + 0.05)
-        viewport.update(state, SIZE, touched=0.0)
-        if viewport.drawn is not None and getattr(viewport.drawn, "plan", None) == Plan(Kind.COLOUR):
+    for _ in living(viewport, state):
+        if getattr(viewport.drawn, "plan", None) == Plan(Kind.COLOUR):
             break
-        time.sleep(0.01)
     rested = getattr(viewport.drawn, "plan", None)
     assert 0.25 in moved and moved <= {0.25, 1.0}
     assert rested == Plan(Kind.COLOUR), "all of them"
@@ -369,14 +348,11 @@ def test_of_a_huge_scene_only_a_share_is_brought_to_opengl_on_the_processor(view
     picture = viewport.picture
     assert picture is not None and picture.easel.asked.keys == (0,) and viewport.shares == ()
     plans = []
-    for turn in range(300):
-        pose = orbit(START, 0.02 * min(turn, 20), 0.0)
-        state = replace(state.with_scene(pose=pose), now=state.now + 0.05)
-        viewport.update(state, SIZE, touched=state.now if turn < 20 else 0.0)
+    for turn, now in enumerate(living(viewport, state, turns=20)):
+        state = now
         plans.append(getattr(viewport.drawn, "plan", None))
         if turn > 20 and viewport.whole and not viewport.settling:
             break
-        time.sleep(0.01)
     live = viewport._made()._scene
     assert live is not None and {*live._levels} == {share}
     viewport.thin(fewer.scene, fewer.share, fewer.thinned, fewer.around)
@@ -436,15 +412,12 @@ def test_what_a_phrase_does_not_mean_leaves_the_picture_and_no_splat_is_drawn(vi
         asked = replace(state.asking.prompts[0], text=phrase, calibrated=query.threshold)
         state = state.with_asking(prompts=(asked,))
         viewport.ask((asked.key,), query, state.asking.revision)
-        view = None
-        for _ in range(600):
-            state = replace(state, now=state.now + 0.05)
-            viewport.update(state, SIZE, touched=0.0)
+        view, frames = None, living(viewport, state, count=600)
+        for state in frames:
             view = viewport.view(state) or view
             whole = viewport.whole and not viewport.settling
             if whole and view is not None and tuple(view.frame.alphas.shape) == SIZE[::-1]:
                 break
-            time.sleep(0.01)
         assert view is not None
         parts = (view.relevance, view.frame, view.camera, view.query, view.revision)
         done = Answer(1, view.keys, *parts, view.others, view.up, view.cuts, view.name).run(lambda: False)
@@ -458,7 +431,7 @@ def test_what_a_phrase_does_not_mean_leaves_the_picture_and_no_splat_is_drawn(vi
         return narrowed, next(each for each in told if isinstance(each, Answered)), pixels.astype(int)
 
     _, _, plain = seen("armchair")
-    passes = dict(viewport.passes)
+    passes = dict(viewport.stats().passes)
     kept, _, red = seen("red armchair in front of the wall")
     gone, none, blue = seen("blue armchair")
     assert kept is not None and gone is not None and float(kept.relevance.max()) > 0.9
@@ -466,6 +439,6 @@ def test_what_a_phrase_does_not_mean_leaves_the_picture_and_no_splat_is_drawn(vi
     assert abs(red - plain).max() <= 1 and abs(blue - plain).max() > 50, "a rounding; colours of heat"
     again, _, whole = seen('"blue armchair"')
     assert again is None and abs(whole - blue).max() > 50
-    after = dict(viewport.passes)
+    after = dict(viewport.stats().passes)
     splatted = ("colour", "weights")
     assert [after.get(kind) for kind in splatted] == [passes.get(kind) for kind in splatted]

@@ -18,7 +18,6 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from PIL import Image
 
 from app.window.frame.layout import CANVAS_TOP
 from app.window.kit import theme
@@ -414,16 +413,3 @@ def test_without_a_display_there_is_one_sentence() -> None:
     assert done.stderr.strip() == (
         "said: there is no display to open a window on; use langflash render or query, or make run"
     )
-
-
-def test_a_dropped_folder_of_photos_starts_a_reconstruction(display: str, tmp_path: Path) -> None:
-    folder = tmp_path / "photos of a room"
-    folder.mkdir()
-    Image.new("RGB", (40, 30), (90, 60, 30)).save(folder / "tiny.png")
-    running = Program(display)
-    running.client.drop(running.window, [folder], MIDDLE)
-    running.until(lambda s: s["photos"] == ["tiny.png"], "the photo")
-    # 30 pixels a side are too few for any network: the job ends with a sentence about the photo.
-    state = running.until(lambda s: s["job"] is None and s["toasts"], "the end of the job")
-    assert "tiny.png" in state["toasts"][0] and state["gl_errors"] == []
-    running.leave()

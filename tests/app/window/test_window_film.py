@@ -44,14 +44,6 @@ def test_looking_through_a_film_can_be_stopped(program: Program, folder: Path) -
     assert program.state["dialog"] is None and program.state["photos"] == []
 
 
-def test_what_is_no_film_is_said(program: Program, folder: Path) -> None:
-    (folder / "broken.mp4").write_bytes(b"no film at all")
-    drop(program, folder / "broken.mp4")
-    program.until(
-        lambda s: any("no film that can be decoded" in toast for toast in s["toasts"]), "a sentence"
-    )
-
-
 def test_a_film_becomes_a_scene(program: Program, folder: Path) -> None:
     walk = films.write(folder / "walk.mp4", films.walk(6, 10.0))
     drop(program, walk)

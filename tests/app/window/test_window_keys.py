@@ -4,10 +4,6 @@ The window is stopped, as a slow frame would hold it, while a person goes on; th
 """
 
 import itertools
-import os
-import signal
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -22,30 +18,18 @@ from tests.app.window.test_window import (
     program,
     pytestmark,
     scene_file,
-    x_server,
 )
-from tests.tools.journey import PHOTOS
 
 __all__ = ["display", "program", "pytestmark", "scene_file"]  # fixtures and the mark of the window's tests
 
 
-@contextmanager
-def held(program: Program) -> Iterator[None]:
-    """While the window does nothing."""
-    os.kill(program.pid, signal.SIGSTOP)
-    try:
-        yield
-    finally:
-        os.kill(program.pid, signal.SIGCONT)
-
-
 def test_ctrl_a_in_a_field_that_was_just_clicked_is_the_fields(program: Program) -> None:
     x, y = map(str, program.field)
-    with held(program):
+    with program.stopped():
         program.xdotool("mousemove", x, y, "click", "1", "key", "ctrl+a", "type", "wall")
     state = program.until(lambda s: s["prompts"][0][0] == "wall", "the phrase")
     assert state["selected"] == 0 and state["edits"] == []
-    with held(program):
+    with program.stopped():
         program.xdotool("key", "ctrl+a", "type", "floor")
     state = program.until(lambda s: s["prompts"][0][0] == "floor", "the phrase over the first")
     assert state["selected"] == 0 and state["tool"] == "MOVE"
@@ -55,7 +39,7 @@ def test_ctrl_a_after_a_click_on_the_picture_is_the_pictures(program: Program) -
     x, y = map(str, program.field)
     program.xdotool("mousemove", x, y, "click", "1")
     program.at_rest()
-    with held(program):
+    with program.stopped():
         program.xdotool("mousemove", *map(str, MIDDLE), "click", "1", "key", "ctrl+a")
     state = program.until(lambda s: s["selected"] == 12_300, "everything selected")
     assert state["prompts"][0][0] == "floor"
@@ -64,28 +48,18 @@ def test_ctrl_a_after_a_click_on_the_picture_is_the_pictures(program: Program) -
 
 
 def test_letters_for_a_dialog_that_opens_late_are_the_dialogs(program: Program, tmp_path: Path) -> None:
-    with held(program):
+    with program.stopped():
         program.xdotool("key", "ctrl+s", "key", "ctrl+a", "type", "--delay", "5", str(tmp_path / "bcrvx"))
         program.xdotool("key", "Return")
     state = program.until(lambda s: s["scene"] == "bcrvx.langflash", "the saved scene")
     assert state["tool"] == "MOVE" and state["selected"] == 0 and state["dialog"] is None
 
 
-def test_escape_cancels_a_job() -> None:
-    with x_server(*SIZE) as own:  # the window of the other tests has the keys of theirs
-        running = Program(own, *PHOTOS)
-        running.until(lambda s: s["job"] not in (None, "starting"), "a stage")
-        running.xdotool("key", "Escape")
-        state = running.until(lambda s: s["job"] is None, "the end of the job")
-        assert state["scene"] is None and state["toasts"] == ["Stopped."]
-        running.leave()
-
-
 def test_ctrl_f_enter_and_letters_that_come_at_once(program: Program) -> None:
     """The letters are those of tools and of flying; none is taken."""
     program.xdotool("mousemove", *map(str, MIDDLE), "click", "1")
     before = program.at_rest()
-    with held(program):
+    with program.stopped():
         program.xdotool("key", "ctrl+f", "type", "--delay", "5", "wascrvbx")
         program.xdotool("key", "Return", "type", "--delay", "5", "wdqehgf")
     state = program.until(lambda s: [p[0] for p in s["prompts"]] == ["wascrvbx", "wdqehgf"], "two phrases")
@@ -97,7 +71,7 @@ def test_ctrl_f_enter_and_letters_that_come_at_once(program: Program) -> None:
 
 
 def test_a_command_by_its_name(program: Program) -> None:
-    with held(program):
+    with program.stopped():
         program.xdotool("key", "ctrl+p", "type", "--delay", "5", "depth")
     program.until(lambda s: s["dialog"] == "palette", "the palette")
     program.xdotool("key", "Return")

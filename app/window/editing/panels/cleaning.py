@@ -20,8 +20,8 @@ from .. import cleaning as clean
 from ..cleaning import ABOVE, BELOW, Condition
 from ..state import Floaters
 
-_WIDE, _TOP, _MARGIN = 360.0, 150.0, 12.0  # design pixels; _TOP: below the axes
-_HIGH = 530.0  # at the most; of what a box needs
+_WIDE, _TOP = 360.0, 150.0  # design pixels; _TOP: below the axes
+_HIGH, _LOW = 530.0, 160.0  # at the most, of what a box needs; at the least
 _NAME, _SIDE, _VALUE = 106.0, 76.0, 80.0
 _NAMES = {
     "confidence": "Sureness", "size": "Size", "opacity": "Opacity", "depth": "Distance",
@@ -46,7 +46,7 @@ def draw(state: State, look: Look, place: ImVec2, size: ImVec2) -> list[do.Comma
     preview = state.editing.floaters
     if preview is None or not preview.open:
         return []
-    corner, extent = boxes.over_panel(place, size, look) or _over_picture(look, place, size)
+    corner, extent = boxes.opens_at(place, size, size.y, look, _TOP, (_WIDE, _HIGH), _LOW)
     imgui.set_next_window_pos(corner, imgui.Cond_.appearing)
     imgui.set_next_window_size(extent, imgui.Cond_.appearing)
     imgui.push_style_var(imgui.StyleVar_.window_rounding, look.px(8))
@@ -59,14 +59,6 @@ def draw(state: State, look: Look, place: ImVec2, size: ImVec2) -> list[do.Comma
     imgui.end()
     imgui.pop_style_var()
     return issued if kept else [*issued, clean.ShowRules(False)]
-
-
-def _over_picture(look: Look, place: ImVec2, size: ImVec2) -> tuple[ImVec2, ImVec2]:
-    """Its corner and its size where it opens."""
-    top, margin = place.y + look.px(_TOP), look.px(_MARGIN)
-    room = max(place.y + size.y - top - margin, look.px(160))
-    width = min(look.px(_WIDE), size.x - 2 * margin)
-    return ImVec2(place.x + size.x - margin - width, top), ImVec2(width, min(look.px(_HIGH), room))
 
 
 def _kinds(preview: Floaters, look: Look) -> list[do.Command]:

@@ -61,17 +61,14 @@ def _path(state: State) -> tuple[list[do.Command], bool]:
 def _way(folder: Folder, look: Look) -> list[do.Command]:
     """Up, home, and the folders on the way here, a button each."""
     issued: list[do.Command] = []
-    if imgui.button(f"{fa.ICON_FA_ARROW_UP}##up"):
-        issued.append(opening.LookInto(folder.path.parent))
-    widgets.tooltip("Parent folder")
+    up = opening.LookInto(folder.path.parent)
+    issued += widgets.press(f"{fa.ICON_FA_ARROW_UP}##up", up, "Parent folder")
     imgui.same_line(0, look.px(4))
-    if imgui.button(f"{fa.ICON_FA_HOUSE}##home"):
-        issued.append(opening.LookInto(Path.home()))
+    issued += widgets.press(f"{fa.ICON_FA_HOUSE}##home", opening.LookInto(Path.home()))
     for parent in (*reversed(folder.path.parents[:3]), folder.path):
         name = widgets.shortened(parent.name or str(parent), look.px(150))
         widgets.beside(widgets.button_width(name), look.px(2))
-        if widgets.quiet_button(f"{name}##{parent}"):
-            issued.append(opening.LookInto(parent))
+        issued += widgets.press(f"{name}##{parent}", opening.LookInto(parent), quiet=True)
     return issued
 
 
@@ -181,8 +178,7 @@ def _buttons(state: State, confirmed: bool, look: Look) -> list[do.Command]:
     pressed = widgets.default_button(f"{label}###open", look.vec(140, 0), confirmed)
     imgui.end_disabled()
     imgui.same_line()
-    if imgui.button("Cancel", look.vec(110, 0)):
-        issued.append(do.ShowDialog(None))
+    issued += widgets.press("Cancel", do.ShowDialog(None), size=look.vec(110, 0))
     told = "Enter merges" if merging else "Space selects several, Enter opens"
     widgets.beside(imgui.calc_text_size(told).x, look.px(14))
     imgui.align_text_to_frame_padding()

@@ -43,11 +43,8 @@ def draw(state: State, look: Look) -> list[do.Command]:
 def told(film: Film) -> str:
     """What became of the film's frames."""
     left = [f"{count} {REASONS[key]}" for key, count in film.left_out.items() if count]
-    return (
-        f"Of {film.strip.num_looked_at} frames, {', '.join(left)}."
-        if left
-        else f"{film.strip.num_looked_at} frames."
-    )
+    looked_at = film.strip.num_looked_at
+    return f"Of {looked_at} frames, {', '.join(left)}." if left else f"{looked_at} frames."
 
 
 def _number(state: State, film: Film, look: Look) -> list[do.Command]:
@@ -62,16 +59,12 @@ def _number(state: State, film: Film, look: Look) -> list[do.Command]:
         (fa.ICON_FA_PLUS, count + 1, "One frame more, chosen again"),
     ):
         imgui.same_line()
-        imgui.begin_disabled(not 2 <= wanted <= most)
-        if imgui.button(f"{icon}##{wanted > count}"):
-            issued.append(opening.ProposeFrames(wanted, exactly=True))
-        imgui.end_disabled()
-        widgets.tooltip(tip)
+        propose, can = opening.ProposeFrames(wanted, exactly=True), 2 <= wanted <= most
+        issued += widgets.press(f"{icon}##{wanted > count}", propose, tip, able=can)
     imgui.same_line()
     tip = "The sharpest frames, spread evenly along the camera's path"
-    if widgets.quiet_button("Reset to suggested", tip):
-        issued.append(opening.ProposeFrames(min(most, PHOTO_LIMITS.film_photos)))
-    return issued
+    propose = opening.ProposeFrames(min(most, PHOTO_LIMITS.film_photos))
+    return issued + widgets.press("Reset to suggested", propose, tip, quiet=True)
 
 
 def _card(film: Film, index: int, still: Still, size: ImVec2, look: Look) -> list[do.Command]:
@@ -111,8 +104,7 @@ def _buttons(film: Film, look: Look) -> list[do.Command]:
         issued.append(opening.TakeFrames())
     imgui.end_disabled()
     imgui.same_line()
-    if imgui.button("Cancel", look.vec(110, 0)):
-        issued.append(do.ShowDialog(None))
+    issued += widgets.press("Cancel", do.ShowDialog(None), size=look.vec(110, 0))
     imgui.same_line(0, look.px(14))
     imgui.align_text_to_frame_padding()
     imgui.text_colored(theme.MUTED, "Click a frame to include or exclude it")

@@ -11,8 +11,8 @@ from ...kit import theme, widgets
 from ...kit.look import Look
 from ...recovery import commands as keep
 from ...recovery.state import Project
-from ...scene import commands as show
 from ...scene import samples
+from ...scene.commands import try_out
 from ...scene.drops import SCENE_SUFFIX
 from ...scene.state import RECONSTRUCTING, said
 from ...state import State
@@ -76,11 +76,8 @@ def draw(state: State, look: Look, corner: ImVec2, size: ImVec2) -> list[do.Comm
 def invitation(num_photos: int) -> tuple[str, str]:
     """What can be done here, in a word and in a line, while so many photos wait beside it."""
     if num_photos:
-        plural = "s wait" if num_photos > 1 else " waits"
-        return (
-            f"{num_photos} photo{plural} on the left",
-            "reconstruct the room there, or drop more photos here",
-        )
+        title = f"{num_photos} photo{'s wait' if num_photos > 1 else ' waits'} on the left"
+        return title, "reconstruct the room there, or drop more photos here"
     return "Drop photos of a room here", "two or more, taken a step apart; or a film, a scene, or splats"
 
 
@@ -90,7 +87,7 @@ def draw_photos(state: State, look: Look, corner: ImVec2, size: ImVec2) -> None:
     shown = [picture for picture in pictures if picture is not None]
     if not shown:
         return
-    canvas, gap = imgui.get_window_draw_list(), look.px(_GAP)
+    canvas, gap, rounding = imgui.get_window_draw_list(), look.px(_GAP), look.px(6)
     end = ImVec2(corner.x + size.x, corner.y + size.y)
     canvas.add_rect_filled(corner, end, widgets.u32(theme.CANVAS))
     columns = 1 if len(shown) == 1 else 2 if len(shown) <= 4 else 4 if len(shown) <= 12 else 6
@@ -102,10 +99,8 @@ def draw_photos(state: State, look: Look, corner: ImVec2, size: ImVec2) -> None:
         width = min(wide, tall * aspect)
         height = width / aspect
         low = ImVec2(left + (wide - width) / 2, top + (tall - height) / 2)
-        canvas.add_image_rounded(
-            picture, low, ImVec2(low.x + width, low.y + height), ImVec2(0, 0), ImVec2(1, 1), 0xFFFFFFFF,
-            look.px(6),
-        )  # fmt: skip
+        high = ImVec2(low.x + width, low.y + height)
+        canvas.add_image_rounded(picture, low, high, ImVec2(0, 0), ImVec2(1, 1), 0xFFFFFFFF, rounding)
 
 
 def _line(text: str, at: ImVec2, colour=None, factor: float = 1.0) -> None:
@@ -119,17 +114,13 @@ def _line(text: str, at: ImVec2, colour=None, factor: float = 1.0) -> None:
 
 def _buttons(at: ImVec2, look: Look) -> list[do.Command]:
     """Open and paste, their middle at `at`."""
-    issued: list[do.Command] = []
-    width, gap = look.px(150), look.px(8)
-    imgui.set_cursor_screen_pos(ImVec2(at.x - width - gap / 2, at.y))
-    if widgets.primary_button(f"{fa.ICON_FA_FOLDER_OPEN}  Photos ...", ImVec2(width, 0)):
-        issued.append(opening.OpenFiles())
-    widgets.tooltip("Several at once, a folder, or a film  (Ctrl+O)")
+    size, gap = look.vec(150, 0), look.px(8)
+    imgui.set_cursor_screen_pos(ImVec2(at.x - size.x - gap / 2, at.y))
+    label, tip = f"{fa.ICON_FA_FOLDER_OPEN}  Photos ...", "Several at once, a folder, or a film  (Ctrl+O)"
+    issued: list[do.Command] = [*widgets.press(label, opening.OpenFiles(), tip, size, on=True)]
     imgui.same_line(0, gap)
-    if imgui.button(f"{fa.ICON_FA_PASTE}  Paste", ImVec2(width, 0)):
-        issued.append(opening.Paste())
-    widgets.tooltip("A picture, files or a path from the clipboard  (Ctrl+V)")
-    return issued
+    tip = "A picture, files or a path from the clipboard  (Ctrl+V)"
+    return issued + widgets.press(f"{fa.ICON_FA_PASTE}  Paste", opening.Paste(), tip, size)
 
 
 def _samples(at: ImVec2, room: float, look: Look) -> list[do.Command]:
@@ -143,14 +134,9 @@ def _samples(at: ImVec2, room: float, look: Look) -> list[do.Command]:
     for place, (label, photos) in enumerate(pairs[:count]):
         corner, size = ImVec2(left + place * (width + gap), at.y), ImVec2(width, height)
         if _tile(f"##sample {label}", sample(place), corner, size, "", look):
-            issued.append(_try(photos))
+            issued.append(try_out(photos))
         _line(label, ImVec2(corner.x + width / 2, corner.y + height + look.px(20)))
     return issued
-
-
-def _try(photos: tuple[Path, ...]) -> do.Command:
-    """A new room of these photos."""
-    return show.Instead((show.SetPhotosAside(), show.AddPhotos(photos), show.Reconstruct()))
 
 
 def _tile(name: str, picture: str, corner: ImVec2, size: ImVec2, icon: str, look: Look) -> bool:
@@ -214,9 +200,8 @@ def _project(project: Project, corner: ImVec2, look: Look) -> list[do.Command]:
         place = ImVec2(corner.x, below + (line + 1) * look.px(18))
         canvas.add_text(place, widgets.u32(theme.MUTED), widgets.shortened(text, size.x))
     imgui.set_cursor_screen_pos(ImVec2(corner.x + size.x - side, below - look.px(6)))
-    if widgets.quiet_button(f"{fa.ICON_FA_XMARK}##forget {project.path}", "Remove from this list  (Delete)"):
-        issued.append(keep.ForgetRecent(project.path))
-    return issued
+    label, tip = f"{fa.ICON_FA_XMARK}##forget {project.path}", "Remove from this list  (Delete)"
+    return issued + widgets.press(label, keep.ForgetRecent(project.path), tip, quiet=True)
 
 
 def _sample_words(at: ImVec2, room: float, look: Look) -> list[do.Command]:
@@ -235,6 +220,5 @@ def _sample_words(at: ImVec2, room: float, look: Look) -> list[do.Command]:
     imgui.text_colored(theme.MUTED, said)
     for label, photos in samples.pairs()[: len(widths)]:
         imgui.same_line(0, gap if label == samples.pairs()[0][0] else 0)
-        if widgets.quiet_button(f"{label}##sample {label}"):
-            issued.append(_try(photos))
+        issued += widgets.press(f"{label}##sample {label}", try_out(photos), quiet=True)
     return issued

@@ -47,9 +47,7 @@ def draw(state: State, look: Look, place: ImVec2, size: ImVec2) -> list[do.Comma
         if positive:
             canvas.add_line(middle, ball, widgets.u32(faint), look.px(2))
             canvas.add_circle_filled(ball, radius, widgets.u32(faint))
-            extent = imgui.calc_text_size(_LETTERS[axis])
-            corner = ImVec2(ball.x - extent.x / 2, ball.y - extent.y / 2)
-            canvas.add_text(corner, widgets.u32(theme.DARK.CANVAS), _LETTERS[axis])
+            widgets.centred(_LETTERS[axis], ball, theme.DARK.CANVAS)
         else:
             canvas.add_circle_filled(ball, radius, imgui.IM_COL32(14, 16, 20, 200))
             canvas.add_circle(ball, radius, widgets.u32(faint), 0, look.px(1.5))

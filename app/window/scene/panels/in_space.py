@@ -53,9 +53,10 @@ def _candidates(state: State, look: Look, corner: ImVec2, size: ImVec2) -> None:
         at, colour = ImVec2(corner.x + x, corner.y + y), widgets.u32(widgets.rgba(prompt.colour))
         imgui.get_window_draw_list().add_circle(at, look.px(26), colour, 0, look.px(2))
         text, aside = f"{prompt.text.strip()}?", look.px(30)
-        fits = x + aside + _wide(look, text) <= size.x  # else it stands on the ring's other side
-        place = ImVec2(at.x + (aside if fits else -aside), at.y - look.px(10))
-        _caption(look, place, text, 0.0 if fits else 1.0)
+        wide = _wide(look, text)
+        fits = x + aside + wide <= size.x  # else it stands on the ring's other side
+        left = at.x + aside if fits else at.x - aside - wide
+        widgets.caption(text, ImVec2(left, at.y - look.px(10)), look)
 
 
 def _keys(state: State, look: Look, corner: ImVec2, size: ImVec2) -> None:
@@ -71,7 +72,7 @@ def _keys(state: State, look: Look, corner: ImVec2, size: ImVec2) -> None:
         if before is not None:
             canvas.add_line(before, at, widgets.u32(theme.DARK.ACCENT), look.px(1.5))
         canvas.add_circle_filled(at, look.px(5), widgets.u32(theme.DARK.ACCENT))
-        _caption(look, ImVec2(at.x + look.px(7), at.y - look.px(10)), str(number), 0.0)
+        widgets.caption(str(number), ImVec2(at.x + look.px(7), at.y - look.px(10)), look)
         before = at
 
 
@@ -94,7 +95,7 @@ def _names(state: State, look: Look, corner: ImVec2, size: ImVec2) -> None:
         if not boxes.within(box, picture) or any(boxes.overlap(box, other) for other in (*taken, *walls)):
             continue
         taken.append(box)
-        _caption(look, ImVec2(box[0], box[1]), name, 0.0)
+        widgets.caption(name, ImVec2(box[0], box[1]), look)
 
 
 def comparing(state: State) -> bool:
@@ -185,11 +186,10 @@ def _compare(state: State, look: Look, corner: ImVec2, size: ImVec2) -> list[do.
     canvas.add_line(low, ImVec2(low.x, high.y), widgets.u32(theme.DARK.ACCENT), look.px(2))
     middle, radius = ImVec2(low.x, (low.y + high.y) / 2), look.px(_HANDLE)
     canvas.add_circle_filled(middle, radius, widgets.u32(theme.DARK.ACCENT))
-    icon, ink = fa.ICON_FA_LEFT_RIGHT, widgets.u32(theme.DARK.ON_ACCENT)
-    extent = imgui.calc_text_size(icon)
-    canvas.add_text(ImVec2(middle.x - extent.x / 2, middle.y - extent.y / 2), ink, icon)
-    _caption(look, ImVec2(low.x - look.px(10), low.y + look.px(10)), "scene", 1.0)
-    _caption(look, ImVec2(low.x + look.px(10), low.y + look.px(10)), "photo", 0.0)
+    widgets.centred(fa.ICON_FA_LEFT_RIGHT, middle, theme.DARK.ON_ACCENT)
+    top = low.y + look.px(10)
+    widgets.caption("scene", ImVec2(low.x - look.px(10) - _wide(look, "scene"), top), look)
+    widgets.caption("photo", ImVec2(low.x + look.px(10), top), look)
     before = imgui.get_cursor_screen_pos()
     imgui.set_cursor_screen_pos(ImVec2(low.x - radius, low.y))
     imgui.set_next_item_allow_overlap()
@@ -202,17 +202,6 @@ def _compare(state: State, look: Look, corner: ImVec2, size: ImVec2) -> list[do.
         return []
     wanted = (imgui.get_mouse_pos().x - corner.x - left) / max(right - left, 1)
     return [camera.Compare(min(max(wanted, 0.0), 1.0))]
-
-
-def _caption(look: Look, at: ImVec2, text: str, anchor: float) -> None:
-    """A word on a dark ground; `anchor` 0 starts at `at`, 1 ends there."""
-    canvas, width = imgui.get_window_draw_list(), _wide(look, text)
-    height = imgui.get_text_line_height() + look.px(6)
-    corner = ImVec2(at.x - anchor * width, at.y)
-    end = ImVec2(corner.x + width, corner.y + height)
-    canvas.add_rect_filled(corner, end, imgui.IM_COL32(14, 16, 20, 190), look.px(5))
-    place = ImVec2(corner.x + look.px(7), corner.y + look.px(3))
-    canvas.add_text(place, widgets.u32(theme.DARK.TEXT), text)
 
 
 def _wide(look: Look, text: str) -> float:

@@ -1,5 +1,8 @@
 """Over the picture's lower right corner: what its colours mean."""
 
+from collections.abc import Callable
+from dataclasses import dataclass
+
 from imgui_bundle import ImVec2, ImVec4, imgui
 
 from langflash_core.base.pictures import Colour, Facts, Legend
@@ -31,7 +34,7 @@ def draw(state: State, look: Look, place: ImVec2, size: ImVec2) -> None:
     ground = imgui.get_style().color_(imgui.Col_.popup_bg)
     with widgets.colours(window_bg=ImVec4(ground.x, ground.y, ground.z, 0.88)):
         imgui.begin("##legend", None, _FLAGS)
-        _body(state, look)
+        _body(state, state.scene.mode.legend, look)
         imgui.end()
     imgui.pop_style_var(2)
 
@@ -41,33 +44,33 @@ def covers_views(width: float, count: int) -> bool:
     return width < _WIDTH + 2 * _MARGIN + 16 + 84 * count + (80 if count < FEWEST else 118)
 
 
+@dataclass
 class _Told(Facts):
     """The facts in a state, each looked up when a legend asks for it."""
 
-    def __init__(self, state: State) -> None:
-        self._state = state
+    state: State
 
     @property
     def phrases(self) -> list[tuple[str, Colour, bool]]:
-        return [(p.text, p.colour, p.found is None or p.found) for p in self._state.asking.asked]
+        return [(p.text, p.colour, p.found is None or p.found) for p in self.state.asking.asked]
 
     @property
     def heat(self) -> tuple[str, float, float]:
-        prompt = self._state.asking.active_prompt
+        prompt = self.state.asking.active_prompt
         assert prompt is not None
-        return prompt.text, *self._state.heat_colours.ends(prompt.cut)
+        return prompt.text, *self.state.heat_colours.ends(prompt.cut)
 
     @property
     def depth_range(self) -> tuple[float, float]:
-        return self._state.stats.depth_range
+        return self.state.stats.depth_range
 
     @property
     def atom(self) -> str:
-        return self._state.editing.atom_name(self._state.asking.atom)
+        return self.state.editing.atom_name(self.state.asking.atom)
 
     @property
     def largest_atoms(self) -> list[tuple[str, Colour]]:
-        insight, named = self._state.asking.insight, self._state.editing.atom_name
+        insight, named = self.state.asking.insight, self.state.editing.atom_name
         if insight is None:
             return []
         largest = sorted(range(len(insight.shares)), key=lambda k: -insight.shares[k])[:_ATOMS_NAMED]
@@ -81,23 +84,21 @@ class _Told(Facts):
 
     @property
     def warnings(self) -> list[str]:
-        info = self._state.scene.info
+        info = self.state.scene.info
         return list(tray.sentences(info.warnings)[:2]) if info is not None else []
 
 
-def _body(state: State, look: Look) -> None:
+def _body(state: State, make: Callable[[Facts], Legend], look: Look) -> None:
     mode = state.scene.mode
     if not possible(mode, state.scene.info):
         widgets.muted("This scene has no data for it.")
-    elif mode.answers and not state.asking.asked:
+        return
+    if mode.answers and not state.asking.asked:
         widgets.muted("Type a phrase to see this.")
-    elif mode.legend is not None:
-        _draw(mode.legend(_Told(state)), state.preferences.colormap, look)
-
-
-def _draw(legend: Legend, colormap: str, look: Look) -> None:
+        return
+    legend = make(_Told(state))
     if legend.title:
-        _bar(legend.title, colormap, legend.numbers, look)
+        _bar(legend.title, state.preferences.colormap, legend.numbers, look)
     for text, colour, muted in legend.patches:
         _swatch(colour, look)
         _fitted(text, theme.MUTED if muted else theme.TEXT)
@@ -107,7 +108,7 @@ def _draw(legend: Legend, colormap: str, look: Look) -> None:
 
 def _bar(title: str, colormap: str, numbers: tuple[str, ...], look: Look) -> None:
     """A colour-bar with numbers below it, evenly spread."""
-    _fitted(title)
+    _fitted(title, theme.TEXT)
     width = imgui.get_content_region_avail().x
     picture = look.thumbnails.get(f"bar {colormap}")
     if picture is not None:
@@ -132,5 +133,5 @@ def _swatch(colour: tuple[float, float, float], look: Look) -> None:
     imgui.same_line()
 
 
-def _fitted(text: str, colour: ImVec4 | None = None) -> None:
-    imgui.text_colored(colour or theme.TEXT, widgets.shortened(text, imgui.get_content_region_avail().x))
+def _fitted(text: str, colour: ImVec4) -> None:
+    imgui.text_colored(colour, widgets.shortened(text, imgui.get_content_region_avail().x))

@@ -1,5 +1,7 @@
 """What the picture shows: the usual modes as buttons, all of them in a menu."""
 
+from itertools import accumulate
+
 from imgui_bundle import ImVec2, imgui
 from imgui_bundle import icons_fontawesome_6 as fa
 
@@ -25,12 +27,13 @@ def draw(state: State, look: Look, room: float) -> list[do.Command]:
     imgui.push_style_var(imgui.StyleVar_.item_spacing, look.vec(4, 0))
     shown = _fitting(look, room)
     for mode in shown:
-        if _choice(mode.label, state.scene.mode is mode):
+        tip, chosen = f"{mode.tip}{_key(mode)}", state.scene.mode is mode
+        if widgets.press(mode.label, None, tip, on=chosen):
             issued.append(camera.SetMode(mode))
-        widgets.tooltip(f"{mode.tip}{_key(mode)}")
         imgui.same_line()
     named = state.scene.mode not in shown
-    if _choice(f"{state.scene.mode.label if named else 'More'}  {fa.ICON_FA_CARET_DOWN}###menu", named):
+    label = f"{state.scene.mode.label if named else 'More'}  {fa.ICON_FA_CARET_DOWN}###menu"
+    if widgets.press(label, None, on=named):
         imgui.open_popup("modes")
     corner = ImVec2(imgui.get_item_rect_min().x, imgui.get_item_rect_max().y + look.px(6))
     imgui.pop_style_var()
@@ -47,14 +50,8 @@ def draw(state: State, look: Look, room: float) -> list[do.Command]:
 def _fitting(look: Look, room: float) -> tuple[Picture, ...]:
     padding = 2 * imgui.get_style().frame_padding.x + look.px(4)
     menu = imgui.calc_text_size(f"{pictures.TRANSMITTANCE.label}  {fa.ICON_FA_CARET_DOWN}").x + padding
-    left = room - menu
-    shown: list[Picture] = []
-    for mode in USUAL:
-        left -= imgui.calc_text_size(mode.label).x + padding
-        if left < 0:
-            break
-        shown.append(mode)
-    return tuple(shown)
+    ends = accumulate(imgui.calc_text_size(mode.label).x + padding for mode in USUAL)
+    return tuple(mode for mode, end in zip(USUAL, ends, strict=True) if end <= room - menu)
 
 
 def _menu(state: State, look: Look) -> list[do.Command]:
@@ -86,9 +83,3 @@ def _menu(state: State, look: Look) -> list[do.Command]:
 
 def _key(mode: Picture) -> str:
     return f"  ({(KEYED.index(mode) + 1) % 10})" if mode in KEYED else ""
-
-
-def _choice(label: str, chosen: bool) -> bool:
-    if chosen:
-        return widgets.primary_button(label)
-    return imgui.button(label)

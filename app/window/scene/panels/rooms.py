@@ -6,6 +6,7 @@ from imgui_bundle import imgui
 from ... import commands as do
 from ...kit import theme, widgets
 from ...kit.look import Look
+from ...kit.widgets import Answer
 from ...state import State
 from .. import commands as show
 from ..merging import AddToScene, MergeScene, can_grow
@@ -21,7 +22,7 @@ def draw(state: State, look: Look) -> list[do.Command]:
     first, *others = state.scene.rooms
     imgui.push_style_var(imgui.StyleVar_.frame_padding, look.vec(6, 0))  # no higher than the heading
     imgui.begin_disabled(state.scene.job is not None)
-    text = f"{fa.ICON_FA_ARROW_LEFT}  {_name(first, look.px(150))}"
+    text = f"{fa.ICON_FA_ARROW_LEFT}  {widgets.shortened(first.info.name, look.px(150))}"
     width = imgui.calc_text_size(text).x + 2 * imgui.get_style().frame_padding.x
     imgui.same_line(imgui.get_cursor_pos_x() + imgui.get_content_region_avail().x - width)
     issued = _back(first, text, "###back")
@@ -29,7 +30,7 @@ def draw(state: State, look: Look) -> list[do.Command]:
     for place, room in enumerate(others):
         if place:
             imgui.same_line(0, 0)
-        text = f"{fa.ICON_FA_CUBE}  {_name(room, space)}"
+        text = f"{fa.ICON_FA_CUBE}  {widgets.shortened(room.info.name, space)}"
         issued += _back(room, text, f"###room {place}")
     imgui.end_disabled()
     imgui.pop_style_var()
@@ -42,10 +43,6 @@ def _back(room: Room, text: str, label: str) -> list[do.Command]:
     return [show.GoToRoom(room.info.serial)] if pressed else []
 
 
-def _name(room: Room, width: float) -> str:
-    return widgets.shortened(room.info.name, width)
-
-
 def draw_drop(state: State, look: Look) -> list[do.Command]:
     """The question where dropped photos belong."""
     assert state.scene.info is not None
@@ -54,36 +51,24 @@ def draw_drop(state: State, look: Look) -> list[do.Command]:
     imgui.text_wrapped(", ".join(names[:_NAMED]) + more)
     widgets.muted(f"{state.scene.info.name} is open.")
     widgets.gap(look.px(4))
-    issued: list[do.Command] = []
-    grows = can_grow(state, len(state.scene.dropped))
-    imgui.begin_disabled(not grows and not state.scene.photos)
-    if imgui.button("Add to this room", look.vec(160, 0)):
-        issued += _additions(state) if grows else [show.dropped(state, state.scene.dropped, new=False)]
-    imgui.end_disabled()
-    widgets.tooltip(_addition_says(state, grows))
-    widgets.beside(look.px(130))
-    if widgets.default_button("New room", look.vec(130, 0)):
-        issued.append(show.dropped(state, state.scene.dropped, new=True))
-    widgets.tooltip("From these photos only; the current room stays one click away")
-    widgets.beside(look.px(110))
-    if imgui.button("Cancel", look.vec(110, 0)):
-        issued.append(do.ShowDialog(None))
-    return issued
-
-
-def _additions(state: State) -> list[do.Command]:
-    """Dropped photos as layers of the room; they lie in the tray beside those that it was made of."""
-    photos = state.scene.dropped
-    tray: list[do.Command] = [show.AddPhotos(photos)] if state.scene.photos else []
-    return [*tray, AddToScene(photos)]
-
-
-def _addition_says(state: State, grows: bool) -> str:
-    if grows:
-        return "Each becomes a layer beside those of the room; the room as it is stays one click away"
-    if state.scene.photos:
-        return "Reconstruct from the photos in the tray plus these"
-    return "This room came from a file; its photos are not in the tray"
+    photos, tray = state.scene.dropped, bool(state.scene.photos)
+    added: tuple[do.Command, ...] = (show.dropped(state, photos, new=False),)
+    says = "This room came from a file; its photos are not in the tray"
+    if tray:
+        says = "Reconstruct from the photos in the tray plus these"
+    grows = can_grow(state, len(photos))
+    if grows:  # they lie in the tray beside those that it was made of
+        added = (*((show.AddPhotos(photos),) if tray else ()), AddToScene(photos))
+        says = "Each becomes a layer beside those of the room; the room as it is stays one click away"
+    alone = "From these photos only; the current room stays one click away"
+    chosen = widgets.answers(
+        look,
+        Answer("Add to this room", 160, added, says, grows or tray),
+        Answer("New room", 130, (show.dropped(state, photos, new=True),), alone),
+        Answer("Cancel", 110, (do.ShowDialog(None),)),
+        default=1,
+    )
+    return [command for commands in chosen for command in commands]
 
 
 def draw_scene_drop(state: State, look: Look) -> list[do.Command]:
@@ -95,18 +80,15 @@ def draw_scene_drop(state: State, look: Look) -> list[do.Command]:
     imgui.text_wrapped(path.name)
     widgets.muted(f"{state.scene.info.name} is open.")
     widgets.gap(look.px(4))
-    issued: list[do.Command] = []
-    if widgets.default_button("Open it", look.vec(130, 0)):
-        issued.append(show.Instead((show.OpenScene(path, alone=True),)))
-    widgets.tooltip("The current scene stays one click away")
-    widgets.beside(look.px(190))
-    if imgui.button("Merge into this scene", look.vec(190, 0)):
-        issued.append(MergeScene(path))
-    widgets.tooltip("Added beside the scene, ready to be moved; Ctrl+Z undoes")
-    widgets.beside(look.px(110))
-    if imgui.button("Cancel", look.vec(110, 0)):
-        issued.append(do.ShowDialog(None))
-    return issued
+    opening, merging = show.Instead((show.OpenScene(path, alone=True),)), MergeScene(path)
+    return widgets.answers(
+        look,
+        Answer("Open it", 130, opening, "The current scene stays one click away"),
+        Answer(
+            "Merge into this scene", 190, merging, "Added beside the scene, ready to be moved; Ctrl+Z undoes"
+        ),
+        Answer("Cancel", 110, do.ShowDialog(None)),
+    )
 
 
 def draw_unsaved(state: State, look: Look) -> list[do.Command]:
@@ -116,13 +98,9 @@ def draw_unsaved(state: State, look: Look) -> list[do.Command]:
     with widgets.colours(text=theme.MUTED):
         imgui.text_wrapped("Discarded edits can be had back for a while, from the list of rooms.")
     widgets.gap(look.px(4))
-    issued: list[do.Command] = []
-    if widgets.default_button("Save ...", look.vec(120, 0)):
-        issued.append(show.SaveFirst())
-    widgets.beside(look.px(120))
-    if imgui.button("Discard", look.vec(120, 0)):
-        issued.append(show.GoOn())
-    widgets.beside(look.px(120))
-    if imgui.button("Cancel", look.vec(120, 0)):
-        issued.append(do.ShowDialog(None))
-    return issued
+    return widgets.answers(
+        look,
+        Answer("Save ...", 120, show.SaveFirst()),
+        Answer("Discard", 120, show.GoOn()),
+        Answer("Cancel", 120, do.ShowDialog(None)),
+    )

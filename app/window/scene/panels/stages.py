@@ -50,14 +50,10 @@ def _opened(title: str) -> bool:
 
 
 def _costs(rows: Sequence[tuple[str, float]], peak: int | None) -> None:
-    for name, seconds in rows[:-1]:
-        _row(name, f"{1000 * seconds:,.0f} ms", theme.MUTED)
-    _row("All", f"{1000 * rows[-1][1]:,.0f} ms", theme.TEXT)
-    if peak:
-        _row("Peak memory", f"{peak:,} MB", theme.TEXT)
-
-
-def _row(name: str, figure: str, colour) -> None:
-    imgui.text_colored(colour, name)
-    with widgets.colours(text=colour):
-        widgets.at_right_edge(figure)
+    figures = [(name, f"{1000 * seconds:,.0f} ms") for name, seconds in rows]
+    figures += [("Peak memory", f"{peak:,} MB")] if peak else []
+    for name, figure in figures:
+        colour = theme.TEXT if name in ("All", "Peak memory") else theme.MUTED
+        imgui.text_colored(colour, name)
+        with widgets.colours(text=colour):
+            widgets.at_right_edge(figure)

@@ -57,7 +57,9 @@ def _row(state: State, look: Look) -> list[do.Command]:
     elif scene.photos:
         kind, issued = f"photos {_icons(state)}", _buttons(state, look)
     else:
-        kind, issued = "none", _open_button(state, look)
+        opens = f"{fa.ICON_FA_FOLDER_OPEN}  Open ..."
+        kind, issued = "none", widgets.press(opens, opening.OpenFiles(), size=ImVec2(_beside(state, look), 0))
+        issued = [*issued, *_put_back(state, look)]
     return issued if widgets.takes_clicks(f"row {kind}") else []
 
 
@@ -92,13 +94,14 @@ def _hint(look: Look) -> None:
     end = ImVec2(corner.x + width, corner.y + height)
     canvas.add_rect_filled(corner, end, widgets.u32(theme.CANVAS), look.px(8))
     canvas.add_rect(corner, end, widgets.u32(theme.LINE), look.px(8), look.px(1.5))
-    lines = ((fa.ICON_FA_IMAGES, theme.ACCENT), ("Drop two or more photos of a room", theme.TEXT))
-    lines = (*lines, ("or a folder, a film, a scene, or a .ply of splats", theme.MUTED))
+    lines = (
+        (fa.ICON_FA_IMAGES, theme.ACCENT),
+        ("Drop two or more photos of a room", theme.TEXT),
+        ("or a folder, a film, a scene, or a .ply of splats", theme.MUTED),
+    )
     step = height / (len(lines) + 1)
     for row, (text, colour) in enumerate(lines, start=1):
-        size = imgui.calc_text_size(text)
-        at = ImVec2(corner.x + (width - size.x) / 2, corner.y + row * step - size.y / 2)
-        canvas.add_text(at, widgets.u32(colour), text)
+        widgets.centred(text, ImVec2(corner.x + width / 2, corner.y + row * step), colour)
     imgui.dummy(ImVec2(width, height))
 
 
@@ -116,21 +119,19 @@ def _tray(state: State, look: Look) -> list[do.Command]:
         imgui.push_id(str(photo.path))
         picture = look.thumbnails.get(str(photo.path))
         found = None if picture is None else lenses.found_lens(info, places, photo, picture[1])
-        removed = _card(look, photo, _lens(photo, found), size, state.scene.job is None)
+        lens = f"Field of view {_fov(photo, found):.0f}°, {_source(photo, found)}"
+        removed = _card(look, photo, lens, size, state.scene.job is None)
         if state.scene.job is None:
             issued += _drag(index)
             if removed:
                 issued.append(show.RemovePhoto(index))
-            elif imgui.is_item_deactivated() and imgui.is_item_hovered() and not _slipped():
-                imgui.open_popup("lens")
+            elif imgui.is_item_deactivated() and imgui.is_item_hovered():
+                way = imgui.get_mouse_drag_delta(0)
+                if not (way.x or way.y):
+                    imgui.open_popup("lens")
         issued += _details(state, index, photo, found, look)
         imgui.pop_id()
     return issued
-
-
-def _slipped() -> bool:
-    way = imgui.get_mouse_drag_delta(0)
-    return bool(way.x or way.y)
 
 
 def _drag(index: int) -> list[do.Command]:
@@ -164,9 +165,8 @@ def _card(look: Look, photo: Photo, lens: str, size: ImVec2, open_for_change: bo
         canvas.add_image_rounded(picture[0], corner, end, low, high, 0xFFFFFFFF, look.px(6))
     else:
         icon = fa.ICON_FA_TRIANGLE_EXCLAMATION if photo.problem else fa.ICON_FA_IMAGE
-        extent = imgui.calc_text_size(icon)
-        middle = ImVec2((corner.x + end.x - extent.x) / 2, (corner.y + end.y - extent.y) / 2)
-        canvas.add_text(middle, widgets.u32(theme.BAD if photo.problem else theme.MUTED), icon)
+        middle = ImVec2((corner.x + end.x) / 2, (corner.y + end.y) / 2)
+        widgets.centred(icon, middle, theme.BAD if photo.problem else theme.MUTED)
     if photo.notes:
         _mark(look, ImVec2(corner.x + look.px(4), corner.y + look.px(22)))
     if hovered:
@@ -194,9 +194,7 @@ def _cross(look: Look, upper_right: ImVec2) -> bool:
     over = place.x <= pointer.x <= place.x + side and place.y <= pointer.y <= place.y + side
     ground = theme.DARK.BAD if over else theme.DARK.CANVAS
     canvas.add_rect_filled(place, ImVec2(place.x + side, place.y + side), widgets.u32(ground), look.px(11))
-    extent = imgui.calc_text_size(fa.ICON_FA_XMARK)
-    at = ImVec2(place.x + (side - extent.x) / 2, place.y + (side - extent.y) / 2)
-    canvas.add_text(at, widgets.u32(theme.DARK.TEXT), fa.ICON_FA_XMARK)
+    widgets.centred(fa.ICON_FA_XMARK, ImVec2(place.x + side / 2, place.y + side / 2), theme.DARK.TEXT)
     return over and imgui.is_mouse_clicked(0)
 
 
@@ -204,11 +202,6 @@ def _fov(photo: Photo, found: FoundLens | None) -> float:
     """Degrees in force: the person's own come before what the photos told, and that before their files."""
     told = photo.recorded or lenses.ASSUMED_FOV if found is None else found.fov
     return photo.fov or told
-
-
-def _lens(photo: Photo, found: FoundLens | None) -> str:
-    """How wide a photo is, and who says so."""
-    return f"Field of view {_fov(photo, found):.0f}°, {_source(photo, found)}"
 
 
 def _source(photo: Photo, found: FoundLens | None) -> str:
@@ -232,43 +225,24 @@ def _details(state: State, index: int, photo: Photo, found: FoundLens | None, lo
     changed, fov = widgets.slider("##fov", now, FOV_RANGE, f"{now:.0f}°", "", width)
     if changed:
         issued.append(show.SetPhotoFov(index, fov))
-    imgui.begin_disabled(photo.fov is None)
     untold = "Use the recorded one" if photo.recorded else "Use the default"
-    if imgui.button(f"{fa.ICON_FA_ROTATE_LEFT}  {untold if found is None else 'Use the one found'}"):
-        issued.append(show.SetPhotoFov(index, None))
-    imgui.end_disabled()
-    issued += _order(state, index)
-    imgui.same_line()
-    if imgui.button(fa.ICON_FA_TRASH):
-        issued.append(show.RemovePhoto(index))
-        imgui.close_current_popup()
-    widgets.tooltip("Remove from the tray")
-    for note in photo.notes:
-        _warning(said_here(note))
-    imgui.end_popup()
-    return issued
-
-
-def _order(state: State, index: int) -> list[do.Command]:
-    """Two arrows that take a photo one place earlier or later."""
-    issued: list[do.Command] = []
+    label = f"{fa.ICON_FA_ROTATE_LEFT}  {untold if found is None else 'Use the one found'}"
+    issued += widgets.press(label, show.SetPhotoFov(index, None), able=photo.fov is not None)
     for label, place, tip in (
         (fa.ICON_FA_ARROW_LEFT, index - 1, "Move earlier; the first photo sets the scene's axes"),
         (fa.ICON_FA_ARROW_RIGHT, index + 1, "Move later"),
     ):
         imgui.same_line()
-        imgui.begin_disabled(not 0 <= place < len(state.scene.photos))
-        if imgui.button(label):
-            issued.append(show.MovePhoto(index, place))
-        imgui.end_disabled()
-        widgets.tooltip(tip)
+        there = 0 <= place < len(state.scene.photos)
+        issued += widgets.press(label, show.MovePhoto(index, place), tip, able=there)
+    imgui.same_line()
+    if removed := widgets.press(fa.ICON_FA_TRASH, show.RemovePhoto(index), "Remove from the tray"):
+        issued += removed
+        imgui.close_current_popup()
+    for note in photo.notes:
+        _warning(said_here(note))
+    imgui.end_popup()
     return issued
-
-
-def _open_button(state: State, look: Look) -> list[do.Command]:
-    """In the place of the others while there is no photo."""
-    pressed = imgui.button(f"{fa.ICON_FA_FOLDER_OPEN}  Open ...", ImVec2(_beside(state, look), 0))
-    return [*([opening.OpenFiles()] if pressed else []), *_put_back(state, look)]
 
 
 def _icons(state: State) -> tuple[bool, ...]:
@@ -294,32 +268,26 @@ def _put_back(state: State, look: Look) -> list[do.Command]:
     if not count:
         return []
     imgui.same_line()
-    pressed = imgui.button(f"{fa.ICON_FA_ROTATE_LEFT}##back", ImVec2(_side(look), 0))
-    widgets.tooltip(f"Put {count} photos back" if count > 1 else "Put the photo back")
-    return [show.PutPhotosBack()] if pressed else []
+    tip = f"Put {count} photos back" if count > 1 else "Put the photo back"
+    return widgets.press(f"{fa.ICON_FA_ROTATE_LEFT}##back", show.PutPhotosBack(), tip, ImVec2(_side(look), 0))
 
 
 def _buttons(state: State, look: Look) -> list[do.Command]:
-    issued: list[do.Command] = []
-    side, width = _side(look), _beside(state, look)
+    side, goes_on = ImVec2(_side(look), 0), state.scene.goes_on
     imgui.begin_disabled(state.scene.choosing)
-    goes_on = state.scene.goes_on
     label = f"{fa.ICON_FA_PLAY}  Resume" if goes_on else f"{fa.ICON_FA_CUBES}  Reconstruct"
-    if widgets.primary_button(f"{label}###reconstruct", ImVec2(width, 0)):
-        issued.append(show.Instead((show.Reconstruct(),)))
-    if goes_on:
-        widgets.tooltip("Continue from the saved progress")
+    begin, tip = show.Instead((show.Reconstruct(),)), "Continue from the saved progress" if goes_on else ""
+    width = ImVec2(_beside(state, look), 0)
+    issued: list[do.Command] = [*widgets.press(f"{label}###reconstruct", begin, tip, width, on=True)]
     if _icons(state)[0]:
         imgui.same_line()
         icon = fa.ICON_FA_HOURGLASS_HALF if state.scene.choosing else fa.ICON_FA_FILTER
-        if imgui.button(f"{icon}##pair", ImVec2(side, 0)):
-            issued.append(show.ChoosePair())
-        widgets.tooltip("Keep only the two photos that make the best scene together")
+        tip = "Keep only the two photos that make the best scene together"
+        issued += widgets.press(f"{icon}##pair", show.ChoosePair(), tip, side)
     issued += _put_back(state, look)
     imgui.same_line()
-    if imgui.button(f"{fa.ICON_FA_TRASH}##clear", ImVec2(side, 0)):
-        issued.append(show.ClearPhotos())
-    widgets.tooltip("Clear the tray; the scene stays")
+    tip = "Clear the tray; the scene stays"
+    issued += widgets.press(f"{fa.ICON_FA_TRASH}##clear", show.ClearPhotos(), tip, side)
     imgui.end_disabled()
     return issued
 
@@ -329,14 +297,12 @@ def _progress(job: Job, now: float, look: Look) -> list[do.Command]:
     stage. The finished ones with their seconds on hover."""
     issued: list[do.Command] = []
     imgui.begin_disabled(job.cancelling)
-    if imgui.button(f"{fa.ICON_FA_STOP}  Cancel", look.vec(_CANCEL, 0)):
-        issued.append(show.CancelJob())
-    widgets.tooltip("Stop  (Esc)")
+    stop, pause = f"{fa.ICON_FA_STOP}  Cancel", f"{fa.ICON_FA_PAUSE}##pause"
+    issued += widgets.press(stop, show.CancelJob(), "Stop  (Esc)", look.vec(_CANCEL, 0))
     imgui.same_line()
     if job.pausable:
-        if imgui.button(f"{fa.ICON_FA_PAUSE}##pause", ImVec2(_side(look), 0)):
-            issued.append(show.PauseJob())
-        widgets.tooltip("Pause: progress is kept, even if you quit")
+        tip = "Pause: progress is kept, even if you quit"
+        issued += widgets.press(pause, show.PauseJob(), tip, ImVec2(_side(look), 0))
         imgui.same_line()
     imgui.end_disabled()
     imgui.align_text_to_frame_padding()
@@ -345,27 +311,17 @@ def _progress(job: Job, now: float, look: Look) -> list[do.Command]:
         widgets.at_right_edge(_seconds(job, now))
     corner, width = imgui.get_cursor_screen_pos(), imgui.get_content_region_avail().x
     _bar(job.fraction, ImVec2(corner.x, corner.y - look.px(4)), width, look)
-    imgui.text(widgets.shortened(_doing(job), width))
+    ending = "pausing" if job.pausing else "stopping"
+    imgui.text(widgets.shortened(ending if job.cancelling else said(job.stage), width))
     if imgui.is_item_hovered():
-        imgui.set_tooltip(_told(job))
+        told = [f"{said(stage)}  {cost:.1f} s" for stage, cost in job.done if cost >= NOTABLE_SECONDS]
+        imgui.set_tooltip("\n".join((job.title, *told)))
     return issued
-
-
-def _doing(job: Job) -> str:
-    if job.cancelling:
-        return "pausing" if job.pausing else "stopping"
-    return said(job.stage)
 
 
 def _seconds(job: Job, now: float) -> str:
     """What is left of the job, where that can be told; else seconds of the stage so far."""
     return time_left(job.age(now), job.fraction) or f"{now - job.started:.1f} s"
-
-
-def _told(job: Job) -> str:
-    """What is being done, and the finished stages with their seconds."""
-    done = [f"{said(stage)}  {seconds:.1f} s" for stage, seconds in job.done if seconds >= NOTABLE_SECONDS]
-    return "\n".join((job.title, *done))
 
 
 def _bar(fraction: float, corner: ImVec2, width: float, look: Look) -> None:

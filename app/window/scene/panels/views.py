@@ -61,12 +61,11 @@ def draw(state: State, look: Look) -> list[do.Command]:
     imgui.same_line(0, look.px(12))
     issued += _in_space(state, look)
     imgui.same_line(0, look.px(4))
-    if imgui.button(fa.ICON_FA_VIDEO, look.vec(34, _VIEW + 6)):
-        issued.append(film.AddKey())
-    widgets.tooltip("Add this view as a key frame  (M)")
+    size = look.vec(34, _VIEW + 6)
+    issued += widgets.press(fa.ICON_FA_VIDEO, film.AddKey(), "Add this view as a key frame  (M)", size)
     if places.offered(state.scene.info):
         imgui.same_line(0, look.px(4))
-        issued += places.draw(state, look, look.vec(34, _VIEW + 6))
+        issued += places.draw(state, look, size)
     return issued
 
 
@@ -74,10 +73,8 @@ def _mark(look: Look) -> None:
     """In the upper right corner of the photo just drawn: something about it does not look right."""
     corner, reach = imgui.get_item_rect_max(), look.px(_MARK)
     middle = ImVec2(corner.x - 1.3 * reach, imgui.get_item_rect_min().y + 1.3 * reach)
-    canvas, size = imgui.get_window_draw_list(), imgui.calc_text_size("!")
-    canvas.add_circle_filled(middle, reach, widgets.u32(theme.BAD))
-    at = ImVec2(middle.x - size.x / 2, middle.y - size.y / 2)
-    canvas.add_text(at, widgets.u32(theme.ON_ACCENT), "!")
+    imgui.get_window_draw_list().add_circle_filled(middle, reach, widgets.u32(theme.BAD))
+    widgets.centred("!", middle, theme.ON_ACCENT)
 
 
 def _roll() -> None:
@@ -94,18 +91,12 @@ def _in_space(state: State, look: Look) -> list[do.Command]:
     imgui.begin_group()
     imgui.push_style_var(imgui.StyleVar_.frame_padding, look.vec(4, 4))
     imgui.push_style_var(imgui.StyleVar_.item_spacing, look.vec(4, 4))
-    imgui.begin_disabled(state.scene.view is None)
-    if _switch(fa.ICON_FA_LEFT_RIGHT, in_space.comparing(state), size):
-        issued.append(camera.Compare(None if in_space.comparing(state) else 0.5))
-    imgui.end_disabled()
-    widgets.tooltip("Compare with the photo, when standing at one  (P)")
-    if _switch(fa.ICON_FA_CAMERA, wanted.photos_in_space, size):
-        issued.append(keep.Prefer(replace(wanted, photos_in_space=not wanted.photos_in_space)))
-    widgets.tooltip("Show the photos' cameras in the scene  (K)")
+    on, able = in_space.comparing(state), state.scene.view is not None
+    compare, tip = camera.Compare(None if on else 0.5), "Compare with the photo, when standing at one  (P)"
+    issued += widgets.press(fa.ICON_FA_LEFT_RIGHT, compare, tip, size, able, on)
+    on, tip = wanted.photos_in_space, "Show the photos' cameras in the scene  (K)"
+    if widgets.press(fa.ICON_FA_CAMERA, None, tip, size, on=on):
+        issued.append(keep.Prefer(replace(wanted, photos_in_space=not on)))
     imgui.pop_style_var(2)
     imgui.end_group()
     return issued
-
-
-def _switch(icon: str, on: bool, size: ImVec2) -> bool:
-    return widgets.primary_button(icon, size) if on else imgui.button(icon, size)

@@ -10,7 +10,6 @@ import torch
 from app.window import commands as do
 from app.window.asking import commands as ask
 from app.window.dialogs import Dialog
-from app.window.effects import Hands
 from app.window.exporting import commands as export
 from app.window.exporting import order as export_form
 from app.window.exporting.effects import ExportingEffects
@@ -26,7 +25,8 @@ from langflash_core.base import outputs
 from langflash_core.base.outputs import OFFERED, ROOM, Output
 from langflash_core.geometry.poses import Pose, Vector
 from langflash_core.scene.edits import Atom, History, Marks, Mask
-from tests.app.window.scenes import after, told
+from tests.app.window.scene.test_rooms import Desk
+from tests.app.window.scenes import after, of_photos, told, with_splats
 from tests.app.window.scenes import shown_scene as scene
 
 
@@ -36,58 +36,41 @@ def form(state: State, **changes) -> State:
 
 @pytest.mark.parametrize("what", (*OFFERED, *ROOM), ids=lambda what: what.name)
 def test_every_kind_says_the_command_that_does_it(what: Output) -> None:
-    state = form(scene(), what=what, path="/out/a picture")
-    order = export_form.order(state)
-    assert not isinstance(order, str)
-    words = shlex.split(order.line)
-    assert words[:5] == [
-        "langflash",
-        "export",
-        "/rooms/my room.langflash",
-        "-o",
-        f"/out/a picture{what.suffix}",
-    ]
+    order = ordered(scene(), what=what, path="/out/a picture")
+    words, output = shlex.split(order.request.line), f"/out/a picture{what.suffix}"
+    assert words[:5] == ["langflash", "export", "/rooms/my room.langflash", "-o", output]
     asked = what.needs_phrases or what is outputs.PAGE  # a page shows the phrases as asked
     assert ("--prompt" in words) == asked and ("--camera" in words) == what.looks
     assert ("--size" in words) == what.sized and ("--seconds" in words) == what.moves
     assert ("--segmented" in words) == (what is outputs.SEGMENTED)
 
 
-def of_photos() -> State:
-    """A scene that knows which photo made what."""
-    state = scene()
-    assert state.scene.info is not None
-    splat = state.scene.info.scene
-    known = replace(splat, view_ids=torch.zeros(len(splat.gaussians), dtype=torch.int64))
-    return state.with_scene(info=replace(state.scene.info, scene=known))
+def ordered(state: State, **changes) -> export_form.Order:
+    """What a form comes to."""
+    order = export_form.order(form(state, **changes))
+    assert not isinstance(order, str), order
+    return order
 
 
 def test_what_fades_on_show_fades_in_files_unless_said_otherwise() -> None:
     def fades(near: bool, **changes) -> bool:
-        state = of_photos()
+        state = of_photos(scene())
         state = replace(state, preferences=replace(state.preferences, near_photos=near))
-        order = export_form.order(form(state, path="/out/a picture", **changes))
-        assert not isinstance(order, str)
-        return "--fade" in order.words
+        return ordered(state, path="/out/a picture", **changes).request.fade
 
-    assert (
-        fades(True, what=outputs.RGB)
-        and fades(True, what=outputs.VIDEO)
-        and not fades(False, what=outputs.RGB)
-    )
+    assert fades(True, what=outputs.RGB) and fades(True, what=outputs.VIDEO)
+    assert not fades(False, what=outputs.RGB)
     assert fades(False, what=outputs.RGB, fade=True) and not fades(True, what=outputs.RGB, fade=False)
     assert not fades(True, what=outputs.PLY) and not fades(True, what=outputs.MASK)
-    plan = after(form(of_photos(), path="/out/a picture", what=outputs.RGB), camera.SwitchRays())
+    plan = after(form(of_photos(scene()), path="/out/a picture", what=outputs.RGB), camera.SwitchRays())
     assert plan.preferences.near_photos and not export_form.fades(plan), "a plan does not fade on show"
 
 
 def test_gaps_are_filled_in_files_as_on_show() -> None:
     def fills(state: State, what: Output, **changes) -> bool:
-        order = export_form.order(form(state, path="/out/a picture", what=what, **changes))
-        assert not isinstance(order, str)
-        return "--fill" in order.words
+        return ordered(state, path="/out/a picture", what=what, **changes).request.fill
 
-    state = of_photos()
+    state = of_photos(scene())
     kinds = {what for what in OFFERED if fills(state, what)}
     assert kinds == {outputs.RGB, outputs.HEAT, outputs.VIDEO, outputs.WEBP, outputs.HEAT_VIDEO}
     assert not fills(state, outputs.VIDEO, only_found=True), "around a thing on its own is no gap"
@@ -97,16 +80,12 @@ def test_gaps_are_filled_in_files_as_on_show() -> None:
 
 def test_what_no_photo_made_does_not_fade_since_its_file_does_not_say_where_photos_looked() -> None:
     for fade in (None, True):
-        order = export_form.order(form(scene(), path="/out/a picture", what=outputs.RGB, fade=fade))
-        assert not isinstance(order, str) and "--fade" not in order.words
-    state = of_photos()
-    assert state.scene.info is not None and state.scene.info.scene.view_ids is not None
-    marks = state.editing.marks
+        assert not ordered(scene(), path="/out/a picture", what=outputs.RGB, fade=fade).request.fade
+    marks = scene().editing.marks
     assert marks is not None
-    merged = state.scene.info.scene.view_ids.clone()
+    merged = torch.zeros(marks.there[0], dtype=torch.int64)
     merged[-9:] = -1
-    info = replace(state.scene.info, scene=replace(state.scene.info.scene, view_ids=merged))
-    state = state.with_scene(info=info)
+    state = with_splats(scene(), view_ids=merged)
     assert not photos_known(state)
     undone = replace(marks, there=(len(merged) - 9, marks.there[1]))
     editing = replace(state.editing, history=History(undone))
@@ -133,12 +112,10 @@ def test_what_is_missing_is_said() -> None:
 
 def test_the_view_on_show_or_all_photos() -> None:
     state = form(after(scene(), camera.JumpTo(1)), path="/out/x.png")
-    order = export_form.order(state)
-    assert not isinstance(order, str) and order.camera_file == Path("/out/x.camera.json")
-    moved = export_form.order(after(state, camera.MoveTo(Pose(Vector(0.0, 0.0, -1.0)))))
-    assert not isinstance(moved, str) and moved.camera_file == Path("/out/x.camera.json")
-    every = export_form.order(form(state, all_views=True))
-    assert not isinstance(every, str) and "--all-views" in every.words and every.camera_file is None
+    for each in (state, after(state, camera.MoveTo(Pose(Vector(0.0, 0.0, -1.0))))):
+        assert ordered(each).camera_file == Path("/out/x.camera.json")
+    every = ordered(state, all_views=True)
+    assert every.request.all_views and every.camera_file is None
 
 
 def test_the_view_on_show_has_the_shape_of_the_window() -> None:
@@ -146,17 +123,14 @@ def test_the_view_on_show_has_the_shape_of_the_window() -> None:
     state = form(scene(), side=1024, path="/out/x.png")
     assert state.scene.pose.aspect == pytest.approx(4 / 3)
     wide = replace(state, stats=replace(state.stats, picture_size=(1200, 600)))
-    order = export_form.order(wide)
-    assert not isinstance(order, str) and order.request.size == (1024, 512)
-    every, undrawn = export_form.order(form(wide, all_views=True)), export_form.order(state)
-    assert not isinstance(every, str) and not isinstance(undrawn, str)
+    assert ordered(wide).request.size == (1024, 512)
+    every, undrawn = ordered(wide, all_views=True), ordered(state)
     assert every.request.size == undrawn.request.size == (1024, 768)  # of photos; before the first picture
 
 
 def test_an_unsaved_scene_is_read_from_its_copy() -> None:
     state = form(after(scene(None), keep.CopyAt(Path("/state/copy.langflash"))), path="/x")
-    order = export_form.order(state)
-    assert not isinstance(order, str) and order.request.scene == Path("/state/copy.langflash")
+    assert ordered(state).request.scene == Path("/state/copy.langflash")
     assert "copy" in export_form.remarks(state)[0]
 
 
@@ -168,12 +142,10 @@ def test_unsaved_edits_and_a_selection_are_read_from_their_copies() -> None:
     state = form(replace(plain, editing=editing), what=outputs.PLY, path="/x")
     assert state.editing.unsaved and "save it first" in str(export_form.order(state))  # before the copies
     state = after(state, export.CopiesAt(Path("/s/edited.langflash"), Path("/s/selection.langflash")))
-    order = export_form.order(state)
-    assert not isinstance(order, str) and order.request.scene == Path("/s/edited.langflash")
+    assert ordered(state).request.scene == Path("/s/edited.langflash")
     assert "edits are not saved" in export_form.remarks(state)[0]
     state = form(state, only_selected=True)
-    order = export_form.order(state)
-    assert not isinstance(order, str) and order.request.scene == Path("/s/selection.langflash")
+    assert ordered(state).request.scene == Path("/s/selection.langflash")
     assert "selection is not saved" in export_form.remarks(state)[0]
     nothing = replace(state.editing, history=History(marks))
     again = after(replace(state, editing=nothing), export.ShowExport())
@@ -198,7 +170,7 @@ def test_an_export_never_replaces_a_photo() -> None:
     state = scene(None).with_scene(photos=photos)
     state = after(state, keep.CopyAt(Path("/state/copy.langflash")), export.ShowExport())
     assert state.exporting.form.path == "/p/left_picture.png"
-    assert not isinstance(export_form.order(state), str)
+    ordered(state)
     for path in ("/p/left.png", "/p/left"):
         assert "photo" in wrong(form(state, path=path))
     views = form(state, path="/p/left.png", all_views=True)
@@ -206,9 +178,7 @@ def test_an_export_never_replaces_a_photo() -> None:
 
 
 def written(state: State) -> set[Path]:
-    order = export_form.order(state)
-    assert not isinstance(order, str), order
-    return set(order.files)
+    return set(ordered(state).files)
 
 
 @pytest.mark.parametrize("all_views", [False, True])
@@ -250,10 +220,9 @@ def test_a_name_of_ones_own_is_kept_for_its_scene_and_named_by_kind() -> None:
 
 def test_a_folder_may_be_there_already_and_is_asked_about(tmp_path) -> None:
     state = form(scene(), what=outputs.SEGMENTED, path=str(tmp_path))
-    order = export_form.order(state)
-    assert not isinstance(order, str) and export_form.there(order) == (tmp_path,)
-    every = export_form.order(form(state, all_views=True))
-    assert not isinstance(every, str) and not {"--all-views", "--view", "--camera"} & set(every.words)
+    assert export_form.there(ordered(state)) == (tmp_path,)
+    every = ordered(state, all_views=True).request.words()
+    assert not {"--all-views", "--view", "--camera"} & set(every)
 
 
 def test_the_name_follows_the_scene() -> None:
@@ -269,43 +238,29 @@ def test_the_name_follows_the_scene() -> None:
     assert saved.exporting.form.path == "/else/hall_picture.png"
 
 
-class Desk:
-    """The effects of exporting, without a process."""
-
-    def __init__(self, state: State, monkeypatch) -> None:
-        self.state, self.ran = state, []
-        hands = Hands(self.perform, self.perform, lambda request: None, lambda: None, lambda: 0.0)
-        self.effects = ExportingEffects(hands, Keeper())
-        monkeypatch.setattr(Exporter, "start", lambda _, words: self.ran.append(words))
-
-    def perform(self, command: do.Command) -> None:
-        before, self.state = self.state, after(self.state, command)
-        self.effects.follow(command, before, self.state)
-
-
 def test_it_is_asked_before_a_file_is_replaced(monkeypatch, folders: Path) -> None:
     path = folders / "room.langflash"
-    desk = Desk(form(scene(path), what=outputs.LABELS, path=str(folders / "a.png")), monkeypatch)
+    ran = []
+    monkeypatch.setattr(Exporter, "start", lambda _, words: ran.append(words))
+    state = form(scene(path), what=outputs.LABELS, path=str(folders / "a.png"))
+    desk = Desk(state, lambda hands, _world: ExportingEffects(hands, Keeper()))
     desk.perform(export.Export())
-    assert len(desk.ran) == 1 and "--replace" not in desk.ran[0]
+    assert len(ran) == 1 and "--replace" not in ran[0]
     desk.perform(export.ExportEnded(0, "done", ""))
     (folders / "a.json").write_text("boxes")  # where the legend would go
     desk.perform(export.Export())
-    assert len(desk.ran) == 1 and desk.state.dialog is Dialog.REPLACE
+    assert len(ran) == 1 and desk.state.dialog is Dialog.REPLACE
     assert desk.state.exporting.there == (folders / "a.json", folders / "a.camera.json")
     desk.perform(do.ShowDialog(Dialog.EXPORT))
     assert desk.state.exporting.form.path == str(folders / "a.png")
     desk.perform(export.Export(sure=True))
-    assert len(desk.ran) == 2 and "--replace" in desk.ran[1] and desk.state.dialog is None
+    assert len(ran) == 2 and "--replace" in ran[1] and desk.state.dialog is None
 
 
 def test_a_heat_map_is_exported_in_the_window_s_own_colours() -> None:
     state = form(scene(), what=outputs.HEAT, path="/out/heat")
-    usual = export_form.order(state)
-    assert not isinstance(usual, str) and "--colormap" not in usual.words and "--span" not in usual.words
+    assert not {"--colormap", "--span"} & set(ordered(state).request.words())
     own = keep.Prefer(replace(state.preferences, colormap="viridis"))
-    order = export_form.order(after(state, own, ask.SetSpan((0.25, 0.9))))
-    assert not isinstance(order, str)
-    assert "--colormap viridis --span 0.25,0.9" in order.line
-    other = export_form.order(form(after(state, own), what=outputs.MASK))
-    assert not isinstance(other, str) and "--colormap" not in other.words
+    order = ordered(after(state, own, ask.SetSpan((0.25, 0.9))))
+    assert "--colormap viridis --span 0.25,0.9" in order.request.line
+    assert "--colormap" not in ordered(after(state, own), what=outputs.MASK).request.words()

@@ -15,18 +15,9 @@ from app.window.recovery import commands as keep
 from app.window.state import State
 from app.window.touring import commands as tour
 from langflash_core.base import pictures
-from langflash_core.scene.edited import first_marks
-from langflash_core.scene.edits import History, Mask
+from langflash_core.scene.edits import Mask
 from tests.app.window import headless
 from tests.app.window.scenes import after, shown_scene
-
-
-def with_marks() -> State:
-    """With a history, as an opened scene has."""
-    state = shown_scene()
-    assert state.scene.info is not None
-    marks = first_marks(state.scene.info.scene)
-    return state.with_editing(history=History(marks), saved=marks)
 
 
 def test_names_and_keys_are_each_given_once() -> None:
@@ -45,7 +36,7 @@ def test_every_group_is_in_the_help() -> None:
 def test_every_command_is_found_by_its_name_and_does_something_or_says_no(entry: table.Entry) -> None:
     assert entry in table.matching(entry.name.upper(), State())
     assert table.named(entry.name) is entry
-    for state in (State(), with_marks()):
+    for state in (State(), shown_scene()):
         command = entry.make(state)
         assert command is None or isinstance(after(state, command), State)
 
@@ -78,7 +69,7 @@ def made(name: str, state: State) -> Command | None:
 
 
 def test_what_has_nothing_to_do_says_so() -> None:
-    empty, state = State(), with_marks()
+    empty, state = State(), shown_scene()
     assert made("Save ...", empty) is None and made("Undo", state) is None
     assert made("Delete the selection", state) is None and made("Show: Agreement", state) is None
     count = state.editing.marks.deleted.count  # type: ignore[union-attr]
@@ -130,7 +121,7 @@ def test_what_keys_do_stands_beside_them(scale: float, monkeypatch) -> None:
 
 def test_the_page_keys_of_a_tour_do_not_move_the_focus() -> None:
     """Page down went to the next stop and to another control at once."""
-    for state, owned in ((with_marks(), False), (after(with_marks(), tour.AddStop()), True)):
+    for state, owned in ((shown_scene(), False), (after(shown_scene(), tour.AddStop()), True)):
         owners = []
 
         def draw(_look, state=state, owners=owners) -> None:

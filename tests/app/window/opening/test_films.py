@@ -2,31 +2,25 @@
 
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import pytest
-from imgui_bundle import imgui
 
-from app.window.commands import Command, ShowDialog, ShowPicture, apply
+from app.window.commands import ShowDialog, ShowPicture
 from app.window.dialogs import Dialog
-from app.window.effects import Effects, Hands
-from app.window.frame import dialogs, table
-from app.window.kit import theme
+from app.window.frame import table
 from app.window.opening import commands as opening
-from app.window.opening import effects, work
+from app.window.opening import work
+from app.window.opening.effects import OpeningEffects
 from app.window.opening.panels import strip as panel
 from app.window.opening.state import Film, told_film
 from app.window.scene import commands as show
 from app.window.scene.drops import sort_drop
-from app.window.scene.effects import SceneEffects
-from app.window.scene.panels import tray
-from app.window.scene.state import Job
 from app.window.scene.work import ReconstructPhotos
 from app.window.state import State
 from langflash_core.errors import Cancelled, FilmError
 from langflash_core.images.settings import PHOTO_LIMITS
 from tests import films
-from tests.app.window import headless
+from tests.app.window.scene import test_rooms
 from tests.app.window.scenes import shown_scene
 
 
@@ -40,27 +34,12 @@ def walk(tmp_path_factory) -> Path:
     return films.write(tmp_path_factory.mktemp("film") / "walk.mp4", films.walk(40, 10.0))
 
 
-class Desk:
-    """Opening and scene with hands that note what was asked, and a state that follows."""
+class Desk(test_rooms.Desk):
+    """Scene and opening."""
 
     def __init__(self, state: State | None = None) -> None:
-        self.state, self.asked, self.dropped = state or State(), list[Any](), list[str]()
-        self.performed: list[Command] = []
-        hands = Hands(self.perform, self.perform, self.asked.append, lambda: None, lambda: 0.0)
-        world: Any = self
-        self.effects: tuple[Effects, ...] = (
-            SceneEffects(hands, world, world, lambda title: None),
-            effects.OpeningEffects(hands, world, lambda: ""),
-        )
-
-    def drop(self, key: str) -> None:
-        self.dropped.append(key)
-
-    def perform(self, command: Command) -> None:
-        before, self.state = self.state, apply(self.state, command)
-        self.performed.append(command)
-        for each in self.effects:
-            each.follow(command, before, self.state)
+        opens = lambda hands, world: OpeningEffects(hands, world, lambda: "")  # noqa: E731
+        super().__init__(state, test_rooms.of_scene, opens)
 
     def look_through(self) -> None:
         """What the worker does with the film, and with its small pictures."""
@@ -70,8 +49,7 @@ class Desk:
             job.run(1, lambda stage, share: self.perform(show.Progressed(stage, share)), lambda: False)
         )
         while self.asked and isinstance(self.asked[0], work.SmallPictures):
-            for command in self.asked.pop(0).run(lambda: False):
-                self.perform(command)
+            self.perform(*self.asked.pop(0).run(lambda: False))
 
     @property
     def film(self) -> Film:
@@ -96,7 +74,7 @@ def test_a_dropped_film_shows_its_strip(desk: Desk, walk: Path) -> None:
     told = panel.told(desk.film)
     assert told.startswith("Of 40 frames, ") and "lay between the chosen ones" in told
     desk.perform(ShowDialog(None))
-    assert len(desk.dropped) == len(pictures), "small pictures go with the dialog"
+    assert len(desk.world.dropped) == len(pictures), "small pictures go with the dialog"
     entry = next(each for each in table.ENTRIES if each.name.startswith("Frames of the film"))
     again = entry.make(desk.state)
     assert again == ShowDialog(Dialog.FILM) and entry.make(State()) is None
@@ -210,22 +188,6 @@ def test_films_are_found(tmp_path: Path, walk: Path) -> None:
     (tmp_path / "a.jpg").touch()
     assert sort_drop([tmp_path]).films == () and len(sort_drop([tmp_path]).photos) == 1
     assert [path.name for path in work.listed(tmp_path).films] == ["a.MOV"]
-
-
-def test_the_dialog_fits_and_switches(desk: Desk) -> None:
-    with headless.context((900, 600)):
-        theme.set_up(1.0)
-        headless.frames(lambda look: dialogs.draw(desk.state, look), headless.look())
-        box = headless.box(Dialog.FILM.value)
-        assert box[0] >= 0 and box[1] >= 0 and box[2] <= 900 and box[3] <= 600
-        assert imgui.is_popup_open("", imgui.PopupFlags_.any_popup_id | imgui.PopupFlags_.any_popup_level)
-
-
-def test_what_remains_of_a_film_is_told() -> None:
-    job = Job("Opening walk.mp4", "film", 0.25, started=10.0)
-    assert tray._seconds(job, 14.0) == "about 12 s left" and tray._seconds(job, 10.5) == "0.5 s"
-    before = Job("x", "network", 0.25, started=10.0, done=(("photos", 8.0),))
-    assert tray._seconds(before, 14.0) == "about 36 s left"
 
 
 def test_what_is_told_of_frames_adds_up_however_they_are_chosen(desk: Desk) -> None:

@@ -7,9 +7,8 @@ from typing import Any
 import pytest
 from PIL import Image, ImageGrab
 
-from app.window.commands import Command, EditDialogPath, ShowDialog, ShowPicture, apply
+from app.window.commands import EditDialogPath, ShowDialog, ShowPicture
 from app.window.dialogs import Dialog
-from app.window.effects import Hands
 from app.window.opening import commands as opening
 from app.window.opening import effects, native, work
 from app.window.opening.panels.welcome import invitation, working
@@ -21,6 +20,7 @@ from app.window.scene.drops import sort_drop
 from app.window.state import State
 from langflash_core.base.resources import asset_path
 from langflash_core.errors import LangFlashError
+from tests.app.window.scene.test_rooms import Desk
 from tests.app.window.scenes import after, shown_scene
 
 
@@ -40,27 +40,8 @@ def folder(tmp_path: Path) -> Path:
     return tmp_path
 
 
-class Desk:
-    """Effects with hands that note what was asked, and a state that follows."""
-
-    def __init__(self, clipboard: str = "") -> None:
-        self.state, self.asked, self.dropped = State(), [], []
-        hands = Hands(self.perform, self.perform, self.asked.append, lambda: None, lambda: 0.0)
-        self.effects = effects.OpeningEffects(hands, self, lambda: clipboard)  # type: ignore[arg-type]
-        self.performed: list[Command] = []
-
-    def drop(self, key: str) -> None:
-        self.dropped.append(key)
-
-    def perform(self, command: Command) -> None:
-        before, self.state = self.state, apply(self.state, command)
-        self.performed.append(command)
-        self.effects.follow(command, before, self.state)
-
-    def work(self) -> None:
-        while self.asked:
-            for command in self.asked.pop(0).run(lambda: False):
-                self.perform(command)
+def opening_desk(clipboard: str = "") -> Desk:
+    return Desk(None, lambda hands, world: effects.OpeningEffects(hands, world, lambda: clipboard))
 
 
 def test_a_folder_shows_folders_photos_and_scenes(folder: Path) -> None:
@@ -87,7 +68,7 @@ def test_small_pictures_come_a_few_at_a_time_and_go_with_the_dialog(folder: Path
     for place in range(5):
         photo(folder / f"{place}.jpg")
     (folder / "broken.jpg").write_bytes(b"no photo")
-    desk = Desk()
+    desk = opening_desk()
     desk.perform(show.AddPhotos((folder / "b.jpg",)))
     desk.perform(opening.OpenFiles())
     assert desk.state.dialog is Dialog.OPEN and desk.state.opening.folder is None
@@ -99,11 +80,11 @@ def test_small_pictures_come_a_few_at_a_time_and_go_with_the_dialog(folder: Path
     desk.perform(opening.Choose(folder / "b.jpg"))
     assert desk.state.opening.chosen == (folder / "A.png",)
     desk.perform(ShowDialog(None))
-    assert len(desk.dropped) == 8
+    assert len(desk.world.dropped) == 8
 
 
 def test_pictures_of_a_folder_that_was_left_are_not_made(folder: Path) -> None:
-    desk = Desk()
+    desk = opening_desk()
     desk.perform(opening.LookInto(folder))
     desk.work()
     desk.perform(opening.MorePictures(folder / "inside", (folder / "b.jpg",)))
@@ -115,7 +96,7 @@ def test_paths_are_pasted(folder: Path) -> None:
     assert pasted_paths(f"'{left}'\n{right}\n") == (str(left), str(right))
     assert pasted_paths(left.as_uri()) == (str(left),)
     assert pasted_paths(f"{left}\nsomething else") == () and effects.pasted_paths("") == ()
-    desk = Desk(clipboard=str(left))
+    desk = opening_desk(clipboard=str(left))
     desk.perform(opening.Paste())
     assert show.OpenPaths((str(left),)) in desk.performed and not desk.asked
 
@@ -185,11 +166,11 @@ def test_several_files_are_pasted_into_the_field_for_a_path(tmp_path: Path, monk
     """Its one line makes blanks of the ends of lines."""
     monkeypatch.setattr(native, "is_there", lambda: False)
     paths = addresses(tmp_path, 300)
-    desk = Desk(clipboard="\r\n".join(path.as_uri() for path in paths))
+    desk = opening_desk(clipboard="\r\n".join(path.as_uri() for path in paths))
     desk.perform(opening.OpenFiles())
     desk.perform(EditDialogPath("  ".join(path.as_uri() for path in paths)))
     assert show.OpenPaths(tuple(map(str, paths))) in desk.performed and desk.state.dialog is None
-    typed = Desk(clipboard=str(paths[0]))
+    typed = opening_desk(clipboard=str(paths[0]))
     typed.perform(opening.LookInto(tmp_path))
     typed.perform(EditDialogPath(str(paths[0])))
     assert typed.performed[-1] == EditDialogPath(str(paths[0])), "one path stays in the field"
@@ -227,17 +208,17 @@ def test_the_desktops_own_dialog_is_asked_where_there_is_one(monkeypatch) -> Non
 
     monkeypatch.setattr(native, "is_there", lambda: True)
     monkeypatch.setattr(native, "NativeDialog", Dialog)
-    desk = Desk()
+    desk = opening_desk()
     desk.perform(opening.OpenFiles())
-    assert desk.state.dialog is None and desk.effects.due < 1
-    desk.effects.tick(desk.state, 1.0)
-    desk.effects.tick(desk.state, 2.0)
+    assert desk.state.dialog is None and desk.effects[0].due < 1
+    desk.effects[0].tick(desk.state, 1.0)
+    desk.effects[0].tick(desk.state, 2.0)
     assert desk.performed[-1] == show.OpenPaths(("/p/a.jpg", "/p/b.jpg"))
-    assert desk.effects.due == float("inf")
+    assert desk.effects[0].due == float("inf")
     answers.append(("/p/c.langflash",))
     desk.state = shown_scene()
     desk.perform(opening.OpenFiles(merging=True))
-    desk.effects.tick(desk.state, 3.0)
+    desk.effects[0].tick(desk.state, 3.0)
     assert desk.performed[-1] == merging.MergeScene(Path("/p/c.langflash"))
 
 
@@ -255,7 +236,7 @@ def test_photos_stay_on_show_while_they_are_worked_on() -> None:
 def test_the_next_look_begins_where_something_was_opened_or_saved(folder: Path, monkeypatch) -> None:
     """It began at home."""
     monkeypatch.setattr(native, "is_there", lambda: False)
-    desk = Desk()
+    desk = opening_desk()
     inside = folder / "inside"
     for command, expected in (
         (show.OpenPaths((str(folder / "b.jpg"),)), folder),
@@ -278,7 +259,7 @@ def test_the_next_look_begins_where_something_was_opened_or_saved(folder: Path, 
 
 def test_a_path_that_is_typed_is_listed(folder: Path) -> None:
     """The list below stayed where it was."""
-    desk = Desk()
+    desk = opening_desk()
     desk.perform(opening.LookInto(folder / "inside"))
     desk.work()
     for text, expected in (

@@ -8,15 +8,14 @@ import pytest
 
 from app.window import commands as do
 from app.window.asking.commands import EditPrompt
-from app.window.effects import Hands
-from app.window.scene import camera, work
+from app.window.scene import camera
 from app.window.scene import commands as show
-from app.window.scene.effects import SceneEffects
 from app.window.scene.state import FLIGHT_SECONDS
 from app.window.state import State
 from langflash_core.geometry.poses import Pose
 from langflash_core.images.settings import PHOTO_LIMITS
 from langflash_core.scene.file import save
+from tests.app.window.scene.test_rooms import Desk
 from tests.app.window.scenes import after, told
 from tests.app.window.scenes import shown_scene as scene
 
@@ -111,20 +110,12 @@ def test_a_scene_from_a_file_takes_the_photos_of_another_away(shown: State, info
     """They would be reconstructed again, or named in an export, as if they were its own."""
     path = tmp_path / "room.langflash"
     save(info.scene, path)
-    asked: list[work.LoadScene] = []
-    state = [after(shown, show.AddPhotos(PATHS))]
-
-    def perform(command: do.Command) -> None:
-        state.append(after(state[-1], command))
-        effects.follow(command, state[-2], state[-1])
-
-    hands = Hands(perform, perform, asked.append, lambda: None, lambda: 0.0)  # type: ignore[arg-type]
-    effects = SceneEffects(hands, None, None, str)  # type: ignore[arg-type]
-    perform(show.OpenPaths((str(path),)))
-    assert len(state[-1].scene.photos) == 3  # until it has come: it may be damaged
-    arrived = asked[0].run(2, lambda *_: None, lambda: False)
-    assert after(state[-1], arrived).scene.photos == ()
-    made = after(state[-1], show.SceneArrived(info))
+    desk = Desk(after(shown, show.AddPhotos(PATHS)))
+    desk.perform(show.OpenPaths((str(path),)))
+    assert len(desk.state.scene.photos) == 3  # until it has come: it may be damaged
+    arrived = desk.asked[0].run(2, lambda *_: None, lambda: False)
+    assert after(desk.state, arrived).scene.photos == ()
+    made = after(desk.state, show.SceneArrived(info))
     assert len(made.scene.photos) == 3  # it was made of them
 
 

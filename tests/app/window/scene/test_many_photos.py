@@ -2,7 +2,7 @@
 photo."""
 
 import io
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,15 +10,13 @@ import torch
 from PIL import Image
 
 from app.window.commands import ShowPicture
-from app.window.effects import Hands
 from app.window.scene.commands import Progressed, SceneArrived
-from app.window.scene.effects import SceneEffects
 from app.window.scene.panels import tray
 from app.window.scene.state import WHOLE_PHOTOS, Job, head_of, said
 from app.window.scene.work import THUMBNAIL_SIDE, ShowPhotos, describe_scene
 from app.window.state import State
-from tests.app.window.scene.test_rooms import Nothing
-from tests.app.window.scenes import after, room
+from tests.app.window.scene.test_rooms import Desk
+from tests.app.window.scenes import room
 
 
 def jpeg(side: int) -> bytes:
@@ -35,35 +33,17 @@ def test_few_photos_are_shown_whole_many_small_and_a_damaged_one_by_its_number(m
     assert [each.rgb.shape for each in shown[:2]] == [(side, side, 3), (30, 30, 3)]
 
 
-@dataclass
-class Drawer(Nothing):
-    """Takes thumbnails; those that are dropped are noted, and one that is decoded here would be."""
-
-    dropped: list[str] = field(default_factory=list)
-    decoded: list[str] = field(default_factory=list)
-
-    def drop(self, key: str) -> None:
-        self.dropped.append(key)
-
-    def put_encoded(self, key: str, encoded: bytes) -> None:
-        self.decoded.append(key)
-
-
 def test_no_frame_decodes_the_photos_of_a_scene_and_none_shows_those_of_another() -> None:
     """32 small photos took .16 processor seconds of the frame that showed their scene."""
-    asked, drawer = [], Drawer()
-    hands = Hands(lambda *_: None, lambda *_: None, asked.append, lambda: None, lambda: 0.0)
-    effects = SceneEffects(hands, drawer, drawer, str)  # type: ignore[arg-type]
+    desk, decoded = Desk(), []
+    desk.world.put_encoded = lambda *named: decoded.append(named)  # type: ignore[attr-defined]
     few = replace(room(torch.eye(3)), photos=(jpeg(30), jpeg(30)))
     other = replace(few, photos=(jpeg(40), jpeg(40)))
-    state = State()
     for serial, (scene, goes) in enumerate(((few, []), (few, []), (other, ["view 0", "view 1"])), 1):
-        before, command = state, SceneArrived(describe_scene(scene, serial, "room"))
-        asked.clear()
-        state = after(state, command)
-        effects.follow(command, before, state)
-        assert [each.photos for each in asked if isinstance(each, ShowPhotos)] == [scene.photos]
-        assert [key for key in drawer.dropped if key.startswith("view")] == goes and not drawer.decoded
+        desk.asked.clear()
+        desk.perform(SceneArrived(describe_scene(scene, serial, "room")))
+        assert [each.photos for each in desk.asked if isinstance(each, ShowPhotos)] == [scene.photos]
+        assert [key for key in desk.world.dropped if key.startswith("view")] == goes and not decoded
 
 
 def test_a_stage_is_one_whatever_photo_it_is_at() -> None:
@@ -84,5 +64,5 @@ def test_a_stage_is_one_whatever_photo_it_is_at() -> None:
 
 def test_what_is_left_of_a_job_is_told() -> None:
     job = Job("Reconstructing", "refinement: photo 3 of 9", 0.5, started=20.0, done=(("photos", 10.0),))
-    assert tray._seconds(job, 30.0) == "about 20 s left"
+    assert tray._seconds(job, 30.0) == "about 20 s left" == tray._seconds(replace(job, done=()), 40.0)
     assert tray._seconds(replace(job, fraction=0.01), 30.0) == "10.0 s"

@@ -1,7 +1,5 @@
 """The buttons of a scene's photos stay in the window, however many there are."""
 
-from dataclasses import replace
-
 import pytest
 from imgui_bundle import ImVec2, imgui
 
@@ -9,14 +7,12 @@ from app.window.frame import layout
 from app.window.kit import theme, widgets
 from app.window.scene.panels import views
 from tests.app.window import headless
-from tests.app.window.scenes import shown_scene
+from tests.app.window.scenes import VIEWS, shown_scene, with_info
 
 
 @pytest.mark.parametrize("count", (2, 9, 32))
 def test_the_switches_beside_the_photos_are_in_sight(count: int) -> None:
-    state = shown_scene()
-    assert state.scene.info is not None
-    state = state.with_scene(info=replace(state.scene.info, views=state.scene.info.views[:1] * count))
+    state = with_info(shown_scene(), views=VIEWS[:1] * count)
     with headless.context((900, 600)):
         theme.set_up(1.0)
         headless.frames(lambda look: layout.draw_all(state, look), headless.look())
@@ -26,14 +22,13 @@ def test_the_switches_beside_the_photos_are_in_sight(count: int) -> None:
 
 def test_a_photo_that_does_not_look_right_is_marked_and_says_why(monkeypatch) -> None:
     state, marks, tips = shown_scene(), [], []
-    assert state.scene.info is not None
-    doubtful = replace(state.scene.info, doubts={1: "It stands alone; take more photos."})
+    doubtful = with_info(state, doubts={1: "It stands alone; take more photos."})
     monkeypatch.setattr(views, "_mark", marks.append)
     monkeypatch.setattr(widgets, "tooltip", tips.append)
     with headless.context((900, 600)):
         theme.set_up(1.0)
         look = headless.look()
-        headless.frames(lambda look: layout.draw_all(state.with_scene(info=doubtful), look), look, 1)
+        headless.frames(lambda look: layout.draw_all(doubtful, look), look, 1)
         assert marks == [look] and "Go to where photo 2 was taken\nIt stands alone; take more photos." in tips
         headless.frames(lambda look: layout.draw_all(state, look), look, 1)
         assert marks == [look]

@@ -30,7 +30,7 @@ from langflash_core.scene.mask import Mask
 from langflash_core.scene.surroundings import Surroundings
 from langflash_core.types import Scene
 from tests.app.window import headless
-from tests.app.window.scenes import after, room
+from tests.app.window.scenes import after, room, with_info
 
 SIZE = (1280, 800)
 EXACT = 1e-9
@@ -178,12 +178,11 @@ def test_beside_an_upright_photo_one_looks_around_as_far_as_the_window_goes_on_s
 ) -> None:
     """In a wide window half of the picture is black from the start; what was seen moves aside, and is not
     lost before it comes to the window's edge."""
-    assert state.scene.info is not None
     upright = Pose(reach=WALL, fov=60.0, aspect=0.4)
     seen = np.abs(wall.places[:, 0]) < WALL * math.tan(math.radians(30)) * upright.aspect
     narrow = wall.of(seen)
     monkeypatch.setattr(near, "surroundings", lambda state: narrow)
-    there = state.with_scene(info=replace(state.scene.info, views=(upright,)))
+    there = with_info(state, views=(upright,))
     wide = poses.of_picture(upright, *SIZE)
     assert narrow.known(wide) < 0.6
     turned, shares = wide, list[float]()
@@ -309,8 +308,7 @@ def test_around_a_pivot_a_hand_turns_no_faster_than_on_the_spot(
     pixel = 1 / poses.intrinsics(away.scene.pose, *SIZE)[0, 0]
     # Between two photos little is held back; the first of the frames moves nothing.
     assert 0.8 * 60 * pixel < turned(away, 60) < 60 * pixel * (1 + EXACT)
-    assert away.scene.info is not None
-    alone = away.with_scene(info=replace(away.scene.info, views=()))
+    alone = with_info(away, views=())
     free = replace(alone, preferences=replace(alone.preferences, near_photos=False))
     assert turned(free, 60) == pytest.approx(60 * moving.TURN), "a thing without photos is turned at once"
 

@@ -14,20 +14,14 @@ from langflash_core.scene.edited import first_marks
 from langflash_core.scene.edits import History
 from langflash_core.scene.mask import Mask
 from langflash_core.scene.settings import TRUST
-from tests.app.window.scenes import VIEWS, shown_scene
+from tests.app.window.scenes import VIEWS, of_photos, shown_scene, with_info
 
 
 @pytest.fixture
 def state() -> State:
     """A scene that is known to be of two photos, seen from 40 degrees to the left of the first."""
-    shown = shown_scene()
-    assert shown.scene.info is not None
-    scene = shown.scene.info.scene
-    known = replace(scene, view_ids=torch.zeros(len(scene.gaussians), dtype=torch.int64))
-    aside = poses.orbit(VIEWS[0], math.radians(40), 0.0)
-    if aside.centre.x > 0:
-        aside = poses.orbit(VIEWS[0], math.radians(-40), 0.0)
-    return shown.with_scene(info=replace(shown.scene.info, scene=known), pose=aside)
+    left, right = (poses.orbit(VIEWS[0], math.radians(turn), 0.0) for turn in (40, -40))
+    return of_photos(shown_scene()).with_scene(pose=left if left.centre.x <= 0 else right)
 
 
 def test_how_far_the_photos_are_is_told_where_the_picture_fades(state: State) -> None:
@@ -53,8 +47,7 @@ def test_what_fills_a_hole_of_all_layers_is_where_photos_look_and_a_merge_is_not
     for layered, sure, known in ((True, 0.0, True), (True, 1.0, False), (False, 0.0, False)):
         confidences = torch.full((len(ids),), sure)
         made = replace(scene, view_ids=ids, confidences=confidences).with_record(layered=layered)
-        shown = state.with_scene(info=replace(state.scene.info, scene=made))
-        assert bool(places_to_keep_to(shown)) == known
+        assert bool(places_to_keep_to(with_info(state, scene=made))) == known
 
 
 def test_gaps_are_filled_in_scenes_of_photos_and_not_around_a_thing(state: State) -> None:

@@ -1,7 +1,9 @@
 """What takes the place of a scene, and the way back to the one before, without a window."""
 
-from dataclasses import dataclass, field, replace
+from collections.abc import Callable
+from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,7 +12,7 @@ import torch
 from app.window import commands as do
 from app.window.dialogs import Dialog
 from app.window.editing import commands as edit
-from app.window.effects import Hands
+from app.window.effects import Effects, Hands
 from app.window.scene import commands as show
 from app.window.scene import merging, work
 from app.window.scene.effects import SceneEffects
@@ -28,30 +30,45 @@ SOME = Mask.of(np.arange(12_300) < 5)
 
 
 class Nothing:
-    """Takes what the renderer and the thumbnails would, and does nothing."""
+    """Takes what the renderer and the thumbnails would; notes which pictures are dropped."""
 
     shares = ()
+
+    def __init__(self) -> None:
+        self.dropped = list[str]()
+
+    def drop(self, key: str) -> None:
+        self.dropped.append(key)
 
     def __getattr__(self, name: str):
         return lambda *_: None
 
 
-@dataclass
+def of_scene(hands: Hands, world: Any) -> Effects:
+    return SceneEffects(hands, world, world, lambda title: None)
+
+
 class Desk:
-    """The effects of the scene, and what they ask of the worker."""
+    """Effects, what they ask of the worker, and a state that follows. make: each of hands, and of what stands
+    for renderer and thumbnails."""
 
-    state: State = field(default_factory=State)
-    asked: list = field(default_factory=list)
-
-    def __post_init__(self) -> None:
+    def __init__(self, state: State | None = None, *make: Callable[[Hands, Any], Effects]) -> None:
+        self.state, self.asked, self.performed = state or State(), list[Any](), list[do.Command]()
         hands = Hands(self.perform, self.perform, self.asked.append, lambda: None, lambda: 0.0)
-        nothing = Nothing()
-        self.effects = SceneEffects(hands, nothing, nothing, str)  # type: ignore[arg-type]
+        self.world = Nothing()
+        self.effects = [each(hands, self.world) for each in make or (of_scene,)]
 
     def perform(self, *commands: do.Command) -> None:
         for command in commands:
             before, self.state = self.state, after(self.state, command)
-            self.effects.follow(command, before, self.state)
+            self.performed.append(command)
+            for each in self.effects:
+                each.follow(command, before, self.state)
+
+    def work(self) -> None:
+        """Do what was asked, and what that asks."""
+        while self.asked:
+            self.perform(*self.asked.pop(0).run(lambda: False))
 
     @property
     def jobs(self) -> list[str]:
@@ -80,7 +97,7 @@ def photo(tmp_path: Path) -> Path:
 
 
 def names(desk: Desk) -> list[str]:
-    return [photo.path.name for photo in desk.state.scene.photos]
+    return [path.name for path in desk.state.scene.paths]
 
 
 def test_photos_dropped_on_a_scene_are_asked_about(desk: Desk, photo: Path) -> None:
@@ -145,19 +162,20 @@ def test_unsaved_edits_are_asked_about_before_anything_takes_their_place(
     assert desk.jobs == ["ReconstructPhotos"] and desk.state.scene.pending == ()
 
 
-def test_saving_first_goes_on_when_it_is_done(edited: Desk) -> None:
-    edited.perform(show.Instead((show.Reconstruct(),)), show.SaveFirst())
-    assert edited.state.dialog is Dialog.SAVE and edited.jobs == []
-    edited.perform(show.SaveScene(Path("/x/a.langflash")))
-    assert edited.jobs == []  # not before it is written
-    edited.perform(show.SceneSaved(Path("/x/a.langflash"), edited.state.editing.marks))
-    assert edited.jobs == ["ReconstructPhotos"] and not edited.state.editing.unsaved
-
-
-def test_a_save_dialog_that_is_closed_ends_what_waited(edited: Desk) -> None:
-    edited.perform(show.Instead((show.Reconstruct(),)), show.SaveFirst(), do.ShowDialog(None))
-    edited.perform(show.SceneSaved(Path("/x/a.langflash"), edited.state.editing.marks))
-    assert edited.jobs == []
+@pytest.mark.parametrize("closed", [False, True], ids=["saved", "closed"])
+@pytest.mark.parametrize("begins", [show.Instead((show.Reconstruct(),)), do.Leave()], ids=["room", "quit"])
+def test_saving_first_goes_on_when_it_is_done(edited: Desk, begins: do.Command, closed: bool) -> None:
+    """Also out of the program, which stayed; a save dialog that is closed ends what waited."""
+    place = Path("/x/a.langflash")
+    edited.perform(begins, show.SaveFirst())
+    assert edited.state.dialog is Dialog.SAVE
+    if closed:
+        edited.perform(do.ShowDialog(None), do.ShowDialog(Dialog.SAVE))
+    edited.perform(show.SaveScene(place))
+    assert edited.jobs == [] and not edited.state.leaving, "it is not written yet"
+    edited.perform(show.SceneSaved(place, edited.state.editing.marks))
+    went_on = edited.state.leaving if isinstance(begins, do.Leave) else edited.jobs == ["ReconstructPhotos"]
+    assert went_on != closed and not edited.state.editing.unsaved and edited.state.scene.pending == ()
 
 
 def test_the_room_before_comes_back_as_it_was_left(edited: Desk, info) -> None:
@@ -183,63 +201,37 @@ def test_rooms_are_few_and_a_file_is_there_once(desk: Desk, info) -> None:
     assert [room.info.serial for room in desk.state.scene.rooms] == [6, 5, 4]
 
 
+OLD, NEW, NEWER = (Path(f"{name}.png") for name in ("old", "new", "newer"))
+
+
+def aside(state: State, *photos: Path) -> State:
+    """A new room of photos begun beside the scene on show; each takes the place of the one before."""
+    for photo in photos:
+        state = after(state, show.SetPhotosAside(), show.AddPhotos((photo,)))
+    return after(state, show.Reconstruct())
+
+
 @pytest.mark.parametrize("end", [show.JobFailed("nothing to see"), show.JobCancelled()])
-def test_where_a_new_room_cannot_be_made_the_tray_is_as_before(end) -> None:
-    state = shown_scene().with_scene(photos=(Photo(Path("old.png")),))
-    state = after(state, show.SetPhotosAside(), show.AddPhotos((Path("new.png"),)), show.Reconstruct())
-    assert [p.path.name for p in state.scene.photos] == ["new.png"]
+@pytest.mark.parametrize("photos", [(NEW,), (NEW, NEWER)])
+def test_where_a_new_room_cannot_be_made_the_tray_is_as_before(photos: tuple[Path, ...], end) -> None:
+    state = aside(shown_scene().with_scene(photos=(Photo(OLD),)), *photos)
+    assert state.scene.paths == photos[-1:]
     state = after(state, end)
-    assert [p.path.name for p in state.scene.photos] == ["old.png"] and state.scene.job is None
+    assert state.scene.paths == (OLD,) and state.scene.job is None
 
 
-def test_the_room_left_keeps_its_own_photos() -> None:
-    state = shown_scene().with_scene(photos=(Photo(Path("old.png")),))
-    state = after(state, show.SetPhotosAside(), show.AddPhotos((Path("new.png"),)), show.Reconstruct())
+@pytest.mark.parametrize("own", [(), (Photo(OLD),)], ids=["no photos", "its photos"])
+def test_the_room_left_keeps_its_own_photos(own: tuple[Photo, ...]) -> None:
+    state = aside(shown_scene().with_scene(photos=own), NEW)
     assert state.scene.info is not None
     state = after(state, show.SceneArrived(replace(state.scene.info, serial=2, path=None)))
-    assert [p.path.name for p in state.scene.photos] == ["new.png"]
-    assert [p.path.name for p in state.scene.rooms[0].photos] == ["old.png"]
-
-
-def test_photos_set_aside_twice_are_not_lost() -> None:
-    state = shown_scene().with_scene(photos=(Photo(Path("old.png")),))
-    state = after(state, show.SetPhotosAside(), show.AddPhotos((Path("new.png"),)))
-    state = after(state, show.SetPhotosAside(), show.AddPhotos((Path("newer.png"),)), show.Reconstruct())
-    state = after(state, show.JobFailed("nothing to see"))
-    assert [p.path.name for p in state.scene.photos] == ["old.png"]
-
-
-def test_a_scene_that_has_no_photos_gets_nobody_elses() -> None:
-    state = after(
-        shown_scene(), show.SetPhotosAside(), show.AddPhotos((Path("new.png"),)), show.Reconstruct()
-    )
-    assert state.scene.info is not None
-    state = after(state, show.SceneArrived(replace(state.scene.info, serial=2, path=None)))
-    assert state.scene.rooms[0].photos == ()
+    assert state.scene.paths == (NEW,) and state.scene.rooms[0].photos == own
 
 
 def test_a_scene_that_cannot_be_opened_leaves_waiting_photos() -> None:
-    state = after(shown_scene(), show.SetPhotosAside(), show.AddPhotos((Path("new.png"),)))
+    state = after(shown_scene(), show.SetPhotosAside(), show.AddPhotos((NEW,)))
     state = after(state, show.OpenScene(Path("missing.langflash")), show.JobFailed("there is no such file"))
-    assert [p.path.name for p in state.scene.photos] == ["new.png"]
-
-
-def test_saving_before_quitting_quits(desk: Desk, tmp_path: Path) -> None:
-    """It saved, and the window stayed."""
-    place = tmp_path / "room.langflash"
-    desk.perform(do.Leave(), show.SaveFirst())
-    assert desk.state.dialog is Dialog.SAVE
-    desk.perform(show.SaveScene(place))
-    assert not desk.state.leaving, "it is not saved yet"
-    desk.perform(show.SceneSaved(place))
-    assert desk.state.leaving
-
-
-def test_who_cancels_quitting_may_save_and_stay(desk: Desk, tmp_path: Path) -> None:
-    place = tmp_path / "room.langflash"
-    desk.perform(do.Leave(), show.SaveFirst(), do.ShowDialog(None), do.ShowDialog(Dialog.SAVE))
-    desk.perform(show.SaveScene(place), show.SceneSaved(place))
-    assert not desk.state.leaving and desk.state.scene.pending == ()
+    assert state.scene.paths == (NEW,)
 
 
 @pytest.fixture

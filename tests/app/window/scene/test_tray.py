@@ -12,6 +12,7 @@ from imgui_bundle import ImVec2, imgui
 
 from app.window.commands import Command
 from app.window.editing import commands as edit
+from app.window.frame import layout
 from app.window.frame.table import named
 from app.window.kit import theme, widgets
 from app.window.kit.look import Look
@@ -108,6 +109,23 @@ def test_a_double_click_is_one_click(
         x, y = middle(items, label)
         hands.click(30, y, times=2)
     assert x > 30 and living.done == [does]
+
+
+@pytest.mark.parametrize("photos", [(), FEW], ids=["no photo", "two photos"])
+def test_cancel_and_find_stand_still_from_stage_to_stage(items: Items, photos: tuple[Path, ...]) -> None:
+    resting = with_photos(photos)
+    stages = ("starting", "photos", "encoder", "language features", "depth", "poses", "refinement")
+    jobs = [resting.with_scene(job=Job("Reconstructing", stage, 0.5)) for stage in stages]
+    seen = []
+    with headless.context((900, 600)):
+        theme.set_up(1.0)
+        for state in (resting, *jobs, resting):
+            headless.frames(lambda look, state=state: layout.draw_all(state, look), headless.look())
+            found = {name.split()[-1]: boxes for name, boxes in items.now().items()}
+            seen.append((found.get("Cancel"), found["##text"]))
+    before, *during, after_it = seen
+    assert during[0][0] is not None and all(each == during[0] for each in during)
+    assert before[0] is None and before == after_it
 
 
 def test_what_has_come_takes_clicks_once_it_is_seen(items: Items) -> None:

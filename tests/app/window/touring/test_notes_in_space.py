@@ -80,7 +80,7 @@ def test_a_note_that_is_behind_is_a_faint_mark_without_words(monkeypatch, behind
     state = after(shown_scene(), tour.ShowTour(True), tour.AddNote("block", ON))
     state = after(state, tour.NotesJudged(frozenset(state.tour.notes) if behind else frozenset()))
     words: list[str] = []
-    monkeypatch.setattr(panel, "_caption", lambda look, at, text: words.append(text))
+    monkeypatch.setattr(panel.widgets, "caption", lambda text, *_, **__: words.append(text))
 
     def drawn(seen) -> list:
         imgui.begin("picture")

@@ -112,6 +112,6 @@ def test_films_go_along_the_tour(shown):
     form = replace(shown.exporting.form, what=outputs.VIDEO, path="/out/film")
     state = toured(shown).with_exporting(form=form, edited=Path("/cache/edited.langflash"))
     wanted = order(state)
-    assert isinstance(wanted, Order) and wanted.words[wanted.words.index("--path") + 1] == "tour"
+    assert isinstance(wanted, Order) and wanted.request.path == "tour"
     none = order(shown.with_exporting(form=replace(form, way="tour")))
     assert none == "A film along the tour needs a stop; fly somewhere and add one in the tour's panel."
