@@ -209,7 +209,7 @@ def rest(desk: Desk) -> None:
     for _ in range(2):  # the session names edits that are kept
         desk.pass_time(2 * KEEP_AFTER)
         desk.work()
-    desk.effects._writer.submit(lambda: None).result()
+    desk.written()
 
 
 def _count(desk: Desk) -> int:

@@ -14,7 +14,7 @@ from langflash_core.scene.edits import History, Marks
 
 from ..commands import Command
 from ..requests import Asked, SceneTask, Task
-from . import edits, projects, sessions
+from . import edits, records
 from .commands import CopyKept, EditsKept, OfferEdits, ProjectsRead
 from .state import KeptPhoto
 
@@ -63,7 +63,7 @@ class ForgetEdits(Task):
     token: str
 
     def run(self, stopping: Asked) -> Iterable[Command]:
-        edits.forget(self.scene, self.token)
+        edits.forget_edits(self.scene, self.token)
         return ()
 
 
@@ -81,7 +81,7 @@ class ForgetScene(Task):
         for file in self.copies:
             with suppress(OSError):
                 file.unlink(missing_ok=True)
-        sessions.forget_exported()
+        records.forget_exported()
         return ()
 
 
@@ -92,7 +92,7 @@ class ForgetFile(Task):
     edits: Path
 
     def run(self, stopping: Asked) -> Iterable[Command]:
-        edits.forget_file(self.edits)
+        records.forget(self.edits)
         return ()
 
 
@@ -118,4 +118,4 @@ class ReadProjects(Task):
     light = True
 
     def run(self, stopping: Asked) -> Iterator[Command]:
-        yield ProjectsRead(tuple(map(projects.read, projects.sweep(self.recent))))
+        yield ProjectsRead(tuple(map(records.project, records.sweep(self.recent))))

@@ -21,7 +21,7 @@ from app.window.kit import theme, widgets
 from app.window.kit.boxes import bars, overlap, window_box
 from app.window.kit.look import Look
 from app.window.recovery import commands as keep
-from app.window.recovery.state import Offer, Project
+from app.window.recovery.state import Kept, Offer
 from app.window.scene.panels.legend import covers_views
 from app.window.state import State
 from app.window.touring import commands as tour
@@ -223,7 +223,7 @@ def test_in_the_empty_window_kept_edits_are_offered_above_what_can_be_opened(
     monkeypatch, items: Items
 ) -> None:
     """It stood before the tile of the very scene that it is about."""
-    project = Project("/rooms/living_room_left.langflash", when=datetime(2026, 11, 25))
+    project = Kept(scene="/rooms/living_room_left.langflash", when=datetime(2026, 11, 25))
     state = State().with_recovery(projects=(project,))
     with context((800, 500)):
         theme.set_up(1.0, "dark")

@@ -18,9 +18,8 @@ from app.window.editing.effects import EditingEffects
 from app.window.editing.state import Region, Tool
 from app.window.effects import Hands
 from app.window.recovery import edits
-from app.window.recovery.effects import KEEP_AFTER, RecoveryEffects
-from app.window.recovery.keeper import Keeper
-from app.window.recovery.sessions import EDITED
+from app.window.recovery.effects import KEEP_AFTER, RecoveryEffects, Writer
+from app.window.recovery.records import EDITED, Keeper
 from app.window.recovery.work import KeepCopy
 from app.window.requests import Job, SceneTask, Task
 from app.window.scene import commands as show
@@ -56,8 +55,8 @@ class Desk:
     def __post_init__(self) -> None:
         hands = Hands(self.perform, self.perform, self.asked.append, lambda: None, lambda: self.state.now)
         nothing = Pictured()
-        self.keeper = Keeper()
-        self.recovery = RecoveryEffects(hands, self.keeper)
+        self.keeper, self.write = Keeper(), Writer(hands)
+        self.recovery = RecoveryEffects(hands, self.keeper, self.write)
         scene = SceneEffects(hands, nothing, nothing, str)  # type: ignore[arg-type]
         self.effects = (scene, EditingEffects(hands, nothing), self.recovery)  # type: ignore[arg-type]
 
@@ -87,7 +86,7 @@ class Desk:
     def rest(self) -> None:
         self.perform(Tick(self.state.now + 2 * KEEP_AFTER))
         self.recovery.tick(self.state, self.state.now)
-        self.recovery._writer.submit(lambda: None).result()  # it has written all that it was given
+        self.write(lambda: None).result()  # it has written all that it was given
         self.work()
 
 

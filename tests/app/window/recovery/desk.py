@@ -3,9 +3,9 @@
 from dataclasses import dataclass, field
 
 from app.window.commands import Command, OfScene, Tick, apply
-from app.window.effects import Hands
-from app.window.recovery.effects import RecoveryEffects
-from app.window.recovery.keeper import Keeper
+from app.window.effects import Effects, Hands
+from app.window.recovery.effects import RecoveryEffects, Writer
+from app.window.recovery.records import Keeper
 from app.window.requests import Job, SceneTask, Task
 from app.window.state import State
 
@@ -19,8 +19,12 @@ class Desk:
 
     def __post_init__(self) -> None:
         self.keeper = Keeper()
-        hands = Hands(self.perform, self.perform, self.asked.append, lambda: None, lambda: self.state.now)
-        self.effects = RecoveryEffects(hands, self.keeper)
+        self.hands = Hands(
+            self.perform, self.perform, self.asked.append, lambda: None, lambda: self.state.now
+        )
+        self.write = Writer(self.hands)
+        self.effects = RecoveryEffects(self.hands, self.keeper, self.write)
+        self.followers: list[Effects] = [self.effects]
 
     def perform(self, command: Command) -> None:
         if isinstance(command, OfScene):
@@ -29,7 +33,9 @@ class Desk:
             command = command.command
         before = self.state
         self.state = apply(before, command)
-        self.effects.follow(command, before, self.state)
+        after = self.state
+        for effects in self.followers:
+            effects.follow(command, before, after)
 
     def work(self) -> None:
         """Everything that was asked of the worker."""
@@ -44,4 +50,15 @@ class Desk:
 
     def pass_time(self, seconds: float) -> None:
         self.perform(Tick(self.state.now + seconds))
-        self.effects.tick(self.state, self.state.now)
+        for effects in self.followers:
+            effects.tick(self.state, self.state.now)
+
+    def written(self) -> None:
+        """Once the writer's thread has done all that it was given."""
+        self.write(lambda: None).result()
+
+    def die(self) -> None:
+        """The system opens the lock of whoever does."""
+        self.effects.close(self.state, crashed=True)
+        if self.keeper._lock is not None:
+            self.keeper._lock.close()

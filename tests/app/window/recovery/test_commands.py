@@ -39,10 +39,11 @@ def test_a_restored_session_has_its_photos_phrases_camera_and_mode() -> None:
     state = after(State(), keep.OfferSession(kept), keep.EndSessionOffer(restore=True))
     assert [photo.fov for photo in state.scene.photos] == [60.0] and state.recovery.session is None
     assert [prompt.text for prompt in state.asking.prompts] == ["door", "rug"]
-    assert after(state, keep.StandAgain(pose, "DEPTH", "kitchen", False)) == state  # no scene yet
+    again = keep.StandAgain(replace(kept, name="kitchen", saved=False))
+    assert after(state, again) == state  # no scene yet
     info = scene().scene.info
     assert info is not None
-    shown = after(state, show.SceneArrived(info), keep.StandAgain(pose, "DEPTH", "kitchen", False))
+    shown = after(state, show.SceneArrived(info), again)
     assert shown.scene.mode is pictures.DEPTH and shown.scene.pose == pose and shown.scene.view is None
     assert shown.scene.info is not None and (shown.scene.info.name, shown.scene.info.path) == (
         "kitchen",
