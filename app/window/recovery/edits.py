@@ -16,7 +16,7 @@ from langflash_core.scene.edits import History
 
 from ...places import state_folder
 from ..scene.drops import SCENE_SUFFIX, still_there
-from .records import forget, newest_first
+from .records import forget, forget_exported, newest_first
 from .state import KeptPhoto, Offer
 
 if TYPE_CHECKING:
@@ -67,8 +67,9 @@ def forget_edits(scene: "Scene", token: str) -> None:
     forget(_place(scene_digest(scene), token))
 
 
-def forget_scene(scene: "Scene | None", paths: Collection[Path]) -> None:
-    """Remove the edits that all sessions kept of a scene, found by its content or its paths."""
+def forget_scene(scene: "Scene | None", paths: Collection[Path], copies: Iterable[Path] = ()) -> None:
+    """Remove all that any session kept of a scene, found by its content or its paths; of this session its
+    `copies`, and of those that ended badly what they exported."""
     from langflash_core.scene.edits_file import read_about, scene_digest
 
     digest, names = None if scene is None else scene_digest(scene), {str(path) for path in paths}
@@ -77,6 +78,10 @@ def forget_scene(scene: "Scene | None", paths: Collection[Path]) -> None:
             found, about, _ = read_about(edits)
             if found == digest or about.get("path") in names:
                 forget(edits)
+    for file in copies:
+        with suppress(OSError):
+            file.unlink(missing_ok=True)
+    forget_exported()
 
 
 def find(scene: "Scene | None" = None, path: Path | None = None) -> Offer | None:

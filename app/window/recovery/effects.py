@@ -7,6 +7,7 @@ and edits by the worker, which has the library.
 import os
 from collections.abc import Callable, Iterable
 from concurrent.futures import Future, ThreadPoolExecutor
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -51,7 +52,7 @@ from .commands import (
 from .preferences import Preferences
 from .records import Keeper
 from .state import Kept, Offer
-from .work import ForgetEdits, ForgetFile, ForgetScene, KeepCopy, KeepEdits, LookForEdits, ReadProjects
+from .work import Forget, KeepCopy, KeepEdits, LookForEdits, ReadProjects
 
 KEEP_AFTER = 1.0  # seconds without a change before a record or edits are written, so that a burst is once
 SAVE_AFTER = 0.5  # the same for preferences
@@ -203,8 +204,8 @@ class RecoveryEffects(Effects):
         if room is None and not files:
             return
         self._copied = False
-        copies = tuple(self._keeper.copies)
-        self._hands.submit(ForgetScene(None if room is None else room.info.scene, files, copies))
+        shown = None if room is None else room.info.scene
+        self._hands.submit(Forget(partial(edits.forget_scene, shown, files, self._keeper.copies)))
 
     def _note_changes(self, before: State, state: State) -> None:
         if state.editing.marks != before.editing.marks and state.scene.info is before.scene.info:
@@ -238,11 +239,11 @@ class RecoveryEffects(Effects):
         if info.history is not None and edited:
             self._write_edits(info, info.history, state)
             if restored is not None and not self._keeper.own(restored):
-                self._replaced.append(ForgetFile(restored))
+                self._replaced.append(Forget(partial(records.forget, restored)))
         else:
             self._hands.submit(LookForEdits(info.serial, info.scene, info.path))
         if replaces and before.scene.info is not None:
-            task = ForgetEdits(before.scene.info.scene, self._keeper.token)
+            task = self._forget_edits(before.scene.info)
             if edited:  # the same edits are to lie beside this scene
                 self._replaced.append(task)
             else:  # something was hidden for good: nothing is kept that shows it
@@ -253,7 +254,7 @@ class RecoveryEffects(Effects):
             self._make_thumbnails(path for path, _ in offer.photos)
             self._hands.perform(OpenScene(offer.scene, offer.edits))
         elif forget:
-            self._hands.submit(ForgetFile(offer.edits))
+            self._hands.submit(Forget(partial(records.forget, offer.edits)))
 
     def _settle(self, state: State) -> None:
         """On the disk lies what is not saved, and nothing once all is."""
@@ -261,9 +262,12 @@ class RecoveryEffects(Effects):
         if state.editing.dirty:
             self._keep_edits(state)
         elif self._edits_kept and state.scene.info is not None:
-            self._hands.submit(ForgetEdits(state.scene.info.scene, self._keeper.token))
+            self._hands.submit(self._forget_edits(state.scene.info))
             self._hands.perform(EditsKept(None))
             self._edits_kept = False
+
+    def _forget_edits(self, info: SceneInfo) -> Forget:
+        return Forget(partial(edits.forget_edits, info.scene, self._keeper.token))
 
     def _keep_edits(self, state: State) -> None:
         info, history = state.scene.info, state.editing.history

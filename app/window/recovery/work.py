@@ -3,8 +3,7 @@
 Heavy imports wait until they are needed.
 """
 
-from collections.abc import Iterable, Iterator
-from contextlib import suppress
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -56,43 +55,13 @@ class KeepEdits(SceneTask):
 
 
 @dataclass(frozen=True)
-class ForgetEdits(Task):
-    """Remove what a session kept of a scene."""
+class Forget(Task):
+    """Remove what was kept."""
 
-    scene: "Scene" = field(repr=False)
-    token: str
-
-    def run(self, stopping: Asked) -> Iterable[Command]:
-        edits.forget_edits(self.scene, self.token)
-        return ()
-
-
-@dataclass(frozen=True)
-class ForgetScene(Task):
-    """Remove all that any session kept of a scene, by its content or its paths; of this session its `copies`,
-    and of those that ended badly what they exported."""
-
-    scene: "Scene | None" = field(repr=False)
-    paths: tuple[Path, ...]
-    copies: tuple[Path, ...] = ()
+    remove: Callable[[], object]
 
     def run(self, stopping: Asked) -> Iterable[Command]:
-        edits.forget_scene(self.scene, self.paths)
-        for file in self.copies:
-            with suppress(OSError):
-                file.unlink(missing_ok=True)
-        records.forget_exported()
-        return ()
-
-
-@dataclass(frozen=True)
-class ForgetFile(Task):
-    """Remove a file of kept edits."""
-
-    edits: Path
-
-    def run(self, stopping: Asked) -> Iterable[Command]:
-        records.forget(self.edits)
+        self.remove()
         return ()
 
 

@@ -24,7 +24,7 @@ from app.window.scene.work import JoinScenes, LoadScene
 from app.window.state import State
 from langflash_core.scene.edits import Mask, delete
 from langflash_core.scene.file import save
-from tests.app.window.recovery.desk import Desk
+from tests.app.window.desk import Desk
 
 
 @pytest.fixture

@@ -26,7 +26,7 @@ from app.window.scene.work import LoadScene, describe_scene
 from langflash_core.base.pictures import DEPTH
 from langflash_core.geometry.poses import Pose, Vector
 from langflash_core.scene.file import save
-from tests.app.window.recovery.desk import Desk
+from tests.app.window.desk import Desk
 from tests.app.window.scenes import room
 
 
@@ -56,21 +56,22 @@ class Table(Desk):
         super().__post_init__()
         self.picture = Seen()
         self.tiles = TileEffects(self.hands, self.picture, self.picture, self.write)  # type: ignore[arg-type]
-        self.followers.insert(0, self.tiles)
+        self.followers = (self.tiles, self.effects)
 
     def settle(self) -> None:
         self.pass_time(1.1 * REMEMBER_AFTER)
         self.written()
 
-    def perform(self, command: Command) -> None:
-        super().perform(command)
-        if isinstance(command, ShowPicture):
-            self.picture.shades[command.key] = int(command.rgb.mean().round())
+    def perform(self, *commands: Command) -> None:
+        super().perform(*commands)
+        for command in commands:
+            if isinstance(command, ShowPicture):
+                self.picture.shades[command.key] = int(command.rgb.mean().round())
 
     def close(self) -> None:
         for effects in self.followers:
             effects.close(self.state, crashed=False)
-        self.followers = []
+        self.followers = ()
 
     def shown(self) -> dict[str, int]:
         """Shades of the pictures of tiles, a moment later."""

@@ -10,39 +10,47 @@ from app.window.requests import Job, SceneTask, Task
 from app.window.state import State
 
 
+class Nothing:
+    """In the place of viewport and thumbnails: does nothing."""
+
+    shares = ()
+
+    def __getattr__(self, name: str):
+        return lambda *_: None
+
+
 @dataclass
-class Desk:
-    """A session without its window: performs commands, and runs requests when told to."""
+class Bare:
+    """Performs commands, and runs requests when told to; `followers` are the effects that see them."""
 
     state: State = field(default_factory=State)
     asked: list[Job | Task] = field(default_factory=list)
+    followers: tuple[Effects, ...] = ()
 
     def __post_init__(self) -> None:
-        self.keeper = Keeper()
         self.hands = Hands(
             self.perform, self.perform, self.asked.append, lambda: None, lambda: self.state.now
         )
-        self.write = Writer(self.hands)
-        self.effects = RecoveryEffects(self.hands, self.keeper, self.write)
-        self.followers: list[Effects] = [self.effects]
 
-    def perform(self, command: Command) -> None:
-        if isinstance(command, OfScene):
-            if not command.holds(self.state):
-                return
-            command = command.command
-        before = self.state
-        self.state = apply(before, command)
-        after = self.state
-        for effects in self.followers:
-            effects.follow(command, before, after)
+    def perform(self, *commands: Command) -> None:
+        for command in commands:
+            if isinstance(command, OfScene):
+                if not command.holds(self.state):
+                    continue
+                command = command.command
+            before, after = self.state, apply(self.state, command)
+            self.state = after
+            for effects in self.followers:
+                effects.follow(command, before, after)
 
-    def work(self) -> None:
-        """Everything that was asked of the worker."""
+    def work(self, serial: int = 7, without: tuple[str, ...] = ()) -> None:
+        """Everything that was asked of the worker, but for requests of these names."""
         while self.asked:
             request = self.asked.pop(0)
+            if type(request).__name__ in without:
+                continue
             if isinstance(request, Job):
-                self.perform(request.run(7, lambda *_: None, lambda: False))
+                self.perform(request.run(serial, lambda *_: None, lambda: False))
                 continue
             for command in request.run(lambda: False):
                 about = isinstance(request, SceneTask)
@@ -52,6 +60,17 @@ class Desk:
         self.perform(Tick(self.state.now + seconds))
         for effects in self.followers:
             effects.tick(self.state, self.state.now)
+
+
+@dataclass
+class Desk(Bare):
+    """With what keeps the session."""
+
+    def __post_init__(self) -> None:
+        super().__post_init__()
+        self.keeper, self.write = Keeper(), Writer(self.hands)
+        self.effects = RecoveryEffects(self.hands, self.keeper, self.write)
+        self.followers = (self.effects,)
 
     def written(self) -> None:
         """Once the writer's thread has done all that it was given."""
