@@ -141,12 +141,12 @@ def test_small_tools_show_their_whole_icons(monkeypatch) -> None:
     """Each was half as wide as its button's padding left."""
     seen: list[tuple[float, float]] = []
 
-    def button(icon: str, chosen: bool, side: ImVec2, tip: str) -> bool:
+    def button(icon: str, on: bool, tip: str, side: ImVec2) -> bool:
         padding = imgui.get_style().frame_padding.x
         seen.append((imgui.calc_text_size(icon).x + 2 * padding, side.x))
         return False
 
-    monkeypatch.setattr(tools, "_tool_button", button)
+    monkeypatch.setattr(tools.widgets, "toggle", button)
     with context((800, 500)):
         theme.set_up(1.0, "dark")
         frames(lambda at: tools.draw(shown_scene(), at, ImVec2(348, 52), ImVec2(452, 416)), look())

@@ -5,7 +5,6 @@ from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 import torch
 
@@ -277,15 +276,6 @@ def test_without_a_selection_nothing_happens(desk: Desk) -> None:
         mending.AskToHide(), mending.HideForGood("blur", RECIPE_DEFAULTS.margin), mending.FillSelection()
     )
     assert desk.state == before and not desk.asked
-
-
-def test_clean_up_keeps_to_the_selection(desk: Desk) -> None:
-    desk.perform(edit.FindFloaters())
-    desk.work()
-    least = np.zeros(COUNT, np.float32)
-    desk.perform(edit.FloatersFound(least.tobytes()), edit.SetStrength(0.3), edit.EndFloaters("delete"))
-    marks = desk.state.editing.marks
-    assert marks is not None and len(marks.deleted) == BLOCK
 
 
 def test_a_stroke_of_the_clone_brush_is_one_edit_and_the_next_begins_at_the_same_source(desk: Desk) -> None:

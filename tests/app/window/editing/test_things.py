@@ -19,7 +19,7 @@ from app.window.scene import commands as show
 from app.window.state import State
 from langflash_core.scene.mask import Mask
 from tests.app.window.editing.test_mending import BLOCK, Desk, desk
-from tests.app.window.scenes import after
+from tests.app.window.scenes import after, labels
 
 __all__ = ["desk"]  # a fixture
 LEVELS = tuple(Mask.first(12_300, count) for count in (100, BLOCK, 5000))
@@ -30,11 +30,6 @@ def clicked(info) -> State:
     """A click found three levels, the second of them a thing."""
     state = after(State(), show.SceneArrived(info), point.SetTool(Tool.PICK))
     return after(state, edit.SelectThing((1.0, 2.0)), ThingFound(LEVELS, 1, "replace"))
-
-
-def labels(state: State) -> list[str]:
-    assert state.editing.history is not None
-    return [entry.label for entry in state.editing.history.done]
 
 
 def test_a_click_is_one_edit_however_its_level_is_moved(clicked: State) -> None:
