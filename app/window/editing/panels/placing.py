@@ -72,10 +72,10 @@ def _fields(state: State, pivot: placing.Spot, look: Look, right: float) -> list
     return [placing.Adjust(wanted)] if isinstance(wanted, Moved) else []
 
 
-def draw_tint(state: State, tint: Tint, look: Look, right: float) -> list[do.Command]:
+def draw_tint(state: State, look: Look, right: float) -> list[do.Command]:
     """Colour and strength, as the picture shows them; made or taken away. right: where a line ends."""
-    editing, info = state.editing, state.scene.info
-    if editing.marks is None or info is None:
+    editing, info, tint = state.editing, state.scene.info, state.editing.tint
+    if editing.marks is None or info is None or tint is None:
         return []
     imgui.align_text_to_frame_padding()
     imgui.text_colored(theme.MUTED, fa.ICON_FA_PALETTE)

@@ -1,5 +1,7 @@
 """On the picture's left: the tools; beside them what the tool in hand and the selection can do."""
 
+from functools import partial
+
 from imgui_bundle import ImVec2, imgui
 from imgui_bundle import icons_fontawesome_6 as fa
 
@@ -15,7 +17,7 @@ from .. import cleaning as clean
 from .. import commands as edit
 from .. import mending, placing, things
 from .. import pointing as point
-from ..state import RADIUS_RANGE, REACH_RANGE, THINGS, Editing, Floaters, Hiding, Reached, Tool
+from ..state import RADIUS_RANGE, REACH_RANGE, THINGS, Editing, Hiding, Reached, Tool
 from . import placing as placing_bar
 
 _TOOLS = (
@@ -67,29 +69,20 @@ def draw(state: State, look: Look, place: ImVec2, size: ImVec2) -> list[do.Comma
     corner = ImVec2(corner.x + look.px(_BUTTON + 22), corner.y)
     end = _beside_dictionary(corner.x, place.x + size.x - look.px(_MARGIN), corner.y)
     right = end - look.px(_PADDING)
-    bars = []
-    if state.editing.tool.selects:
-        bars.append(lambda: _options(state, look, right))
-    if state.editing.tool is Tool.CLONE:
-        bars.append(lambda: _cloning(state, look, right))
-    if state.editing.tool is Tool.PLACE:
-        bars.append(lambda: placing_bar.draw(state, look, right))
-    if state.editing.num_selected or state.editing.waiting:
-        bars.append(lambda: _selection(state, look, right))
-    if state.editing.tint is not None:
-        tint = state.editing.tint
-        bars.append(lambda: placing_bar.draw_tint(state, tint, look, right))
-    if state.editing.hiding is not None and state.editing.num_selected:
-        hiding = state.editing.hiding
-        bars.append(lambda: _hiding(state, hiding, look, right))
-    if state.editing.floaters is not None:
-        found = state.editing.floaters
-        bars.append(lambda: _floaters(state, found, look, right))
-    hidden = state.editing.marks is not None and bool(state.editing.marks.hidden)
-    if hidden and not state.editing.num_selected:
-        bars.append(lambda: _hidden(state))
-    for number, bar in enumerate(bars):
-        wanted, height = _panel(f"##bar{number}", corner, look, bar)
+    editing, selected = state.editing, state.editing.num_selected > 0
+    hidden = editing.marks is not None and bool(editing.marks.hidden)
+    bars = (
+        (editing.tool.selects, _options),
+        (editing.tool is Tool.CLONE, _cloning),
+        (editing.tool is Tool.PLACE, placing_bar.draw),
+        (selected or editing.waiting, _selection),
+        (editing.tint is not None, placing_bar.draw_tint),
+        (editing.hiding is not None and selected, _hiding),
+        (editing.floaters is not None, _floaters),
+        (hidden and not selected, _hidden),
+    )
+    for number, bar in enumerate(bar for stands, bar in bars if stands):
+        wanted, height = _panel(f"##bar{number}", corner, look, partial(bar, state, look, right))
         issued += wanted
         corner = ImVec2(corner.x, corner.y + height + look.px(8))
     return issued
@@ -305,14 +298,14 @@ def _growing(state: State, look: Look) -> list[do.Command]:
     return issued
 
 
-def _floaters(state: State, found: Floaters, look: Look, right: float) -> list[do.Command]:
+def _floaters(state: State, look: Look, right: float) -> list[do.Command]:
     """The preview of floaters, in red in the picture."""
     issued: list[do.Command] = []
     imgui.align_text_to_frame_padding()
     imgui.text_colored(theme.BAD, fa.ICON_FA_WAND_MAGIC_SPARKLES)
     imgui.same_line()
-    marks = state.editing.marks
-    if not found.least or marks is None:
+    found, marks = state.editing.floaters, state.editing.marks
+    if found is None or not found.least or marks is None:
         imgui.text("Looking for floaters ...")
         return issued
     count, strength = len(found.mask(marks.visible)), found.strength
@@ -324,9 +317,10 @@ def _floaters(state: State, found: Floaters, look: Look, right: float) -> list[d
     return issued + _end_floaters(count, found.open, look, right)
 
 
-def _hiding(state: State, asked: Hiding, look: Look, right: float) -> list[do.Command]:
+def _hiding(state: State, look: Look, right: float) -> list[do.Command]:
     """The ways to hide the selection for good, and how much around it; in red in the picture."""
-    issued: list[do.Command] = []
+    asked, issued = state.editing.hiding, list[do.Command]()
+    assert asked is not None
     imgui.align_text_to_frame_padding()
     imgui.text_colored(theme.SELECTED, fa.ICON_FA_USER_SECRET)
     imgui.same_line()
@@ -369,7 +363,7 @@ def _end_floaters(count: int, opened: bool, look: Look, right: float) -> list[do
     return issued + _button("Cancel##floaters", "Cancel  (Esc)", edit.EndFloaters(), right)
 
 
-def _hidden(state: State) -> list[do.Command]:
+def _hidden(state: State, look: Look, right: float) -> list[do.Command]:
     """That something is hidden, and the way back."""
     assert state.editing.marks is not None
     imgui.align_text_to_frame_padding()
