@@ -11,8 +11,10 @@ from pathlib import Path
 
 import platformdirs
 
+PROJECT = "project-"
+"""What files of scenes that were open lately begin with (`app/window/recovery/records.py`)."""
 PICTURE = ".jpg"
-"""Ending of a scene's small picture (`app/window/recovery/projects.py`)."""
+"""Ending of its small picture (`app/window/recovery/tiles.py`)."""
 
 
 def config_folder() -> Path:
@@ -27,20 +29,22 @@ def state_folder() -> Path:
     return Path(own) if own else platformdirs.user_state_path("langflash", appauthor=False)
 
 
-def projects_folder() -> Path:
-    """What is remembered of scenes that were open lately."""
+def earlier_projects() -> Path:
+    """Where earlier versions kept what they remembered of scenes, without `PROJECT` before its name."""
     return config_folder() / "projects"
 
 
 def project_file(scene: str, suffix: str) -> Path:
-    """What is remembered of the scene with this path: under the digest of that. suffix: PICTURE for its small
+    """What is kept of the scene with this path: under the digest of that. suffix: PICTURE for its small
     picture."""
-    return projects_folder() / f"{sha256(os.fsencode(scene)).hexdigest()[:24]}{suffix}"
+    return state_folder() / f"{PROJECT}{sha256(os.fsencode(scene)).hexdigest()[:24]}{suffix}"
 
 
 def forget_pictures(scenes: Iterable[Path]) -> None:
     """Remove the small pictures of scenes, whichever way their paths were given; none there is fine."""
     for scene in scenes:
         for name in {str(scene), str(scene.absolute()), str(scene.resolve())}:
-            with suppress(OSError):
-                project_file(name, PICTURE).unlink(missing_ok=True)
+            file = project_file(name, PICTURE)
+            for place in (file, earlier_projects() / file.name.removeprefix(PROJECT)):
+                with suppress(OSError):
+                    place.unlink(missing_ok=True)

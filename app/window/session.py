@@ -37,10 +37,10 @@ from .kit.textures import Thumbnails
 from .opening.effects import OpeningEffects
 from .recovery import preferences
 from .recovery.commands import Prefer
-from .recovery.effects import RecoveryEffects
-from .recovery.keeper import Keeper
+from .recovery.effects import RecoveryEffects, Writer
 from .recovery.preferences import Preferences
-from .recovery.remembering import RememberingEffects
+from .recovery.records import Keeper
+from .recovery.tiles import TileEffects
 from .scene.commands import OpenPaths
 from .scene.effects import SceneEffects
 from .state import State
@@ -101,9 +101,8 @@ class Session:
     def _begin(self, remembered: Preferences, complaint: str, paths: Sequence[str | Path]) -> None:
         """Every feature's effects, and the first commands."""
         hands = Hands(self._perform, self._post, self._worker.submit, self._worker.cancel, self._now)
-        keeper = Keeper()
-        recovery = RecoveryEffects(hands, keeper)
-        remembering = RememberingEffects(hands, self._viewport, self._thumbnails)
+        keeper, write = Keeper(), Writer(hands)
+        recovery = RecoveryEffects(hands, keeper, write)
         copied = lambda: desktop.clipboard(self._window, "surrogateescape")  # noqa: E731
         entitle = lambda title: glfw.set_window_title(self._window, title)  # noqa: E731
         opening = OpeningEffects(hands, self._thumbnails, copied)
@@ -112,8 +111,8 @@ class Session:
             opening,
             AskingEffects(hands, self._viewport),
             EditingEffects(hands, self._viewport),
+            TileEffects(hands, self._viewport, self._thumbnails, write),  # before who closes their writer
             recovery,
-            remembering,
             ExportingEffects(hands, keeper),
             FilmingEffects(hands),
             TouringEffects(hands, self._viewport),
@@ -124,7 +123,6 @@ class Session:
         )
         opening.begin()
         recovery.begin(remembered, complaint, empty=not paths)
-        remembering.begin(remembered.recent)
         if paths:
             self.dispatch(OpenPaths(tuple(str(p) for p in paths)))
 

@@ -1,6 +1,5 @@
 """What is done while calls fail (`nth.py`): commands on small photos and scenes, and the window's keeping."""
 
-import json
 import os
 import traceback
 from collections.abc import Callable, Iterator, Sequence
@@ -14,8 +13,8 @@ from PIL import Image
 
 from app.cli import main
 from app.places import state_folder
-from app.window.recovery import edits, preferences, sessions
-from app.window.recovery.keeper import Keeper
+from app.window.recovery import edits, preferences, records
+from app.window.recovery.records import Keeper
 from app.window.recovery.state import Kept
 from app.window.scene.work import LoadScene
 from langflash_core.base.formats import USD
@@ -252,7 +251,7 @@ def _history(first: Marks, count: int) -> History:
 
 def _keeper() -> Keeper:
     keeper = Keeper()
-    keeper.token, keeper._stem = "deadbeef", f"{sessions.PREFIX}1-deadbeef"
+    keeper.token, keeper.file = "deadbeef", state_folder() / f"{records.SESSION}1-deadbeef.json"
     return keeper
 
 
@@ -276,16 +275,16 @@ def _recover(scene: Scene, history: History, write: bool) -> Callable[[Path], tu
 def _killed_session(folder: Path) -> tuple[int, str]:
     """A session whose process is gone: its file, and the copy of a scene that nobody saved."""
     state_folder().mkdir(parents=True, exist_ok=True)
-    copy = state_folder() / f"{sessions.PREFIX}1-deadbeef.langflash"
+    copy = state_folder() / f"{records.SESSION}1-deadbeef.langflash"
     copy.write_bytes((folder / "in" / "s.langflash").read_bytes())
     kept = Kept(
         scene=str(copy), saved=False, name="room", phrases=("plant",), likes=("",), thresholds=(None,)
     )
-    copy.with_suffix(".json").write_text(json.dumps(sessions.fields(replace(kept, visible=(True,)))))
+    copy.with_suffix(".json").write_bytes(records.told(replace(kept, visible=(True,))))
     return 0, ""
 
 
 def _restored_session(folder: Path) -> tuple[int, str]:
     """What is left behind is offered, or else still there for the next start."""
-    kept = sessions.left_behind()
+    kept = records.left_behind()
     return (0, "") if kept is not None else (1, "langflash: nothing to go on with")

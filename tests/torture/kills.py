@@ -35,7 +35,7 @@ from langflash_core.scene.edited import edited_scene, first_marks
 from langflash_core.scene.edits import Mask, delete
 from langflash_core.types import Scene
 from tests.app.cli.conftest import stripes
-from tests.app.window.recovery.desk import Desk
+from tests.app.window.desk import Desk
 from tests.torture.rows import Counted
 
 ENDINGS = (".langflash", ".ply", ".spz", ".sog", ".glb", ".splat", ".compressed.ply", ".html")
@@ -179,10 +179,11 @@ def some(scene: Scene, number: int) -> Mask:
 class Window(Desk):
     """Also opens what it is told to open, as the window's worker does."""
 
-    def perform(self, command: Command) -> None:
-        super().perform(command)
-        if isinstance(command, show.OpenScene):
-            self.asked.append(LoadScene(command.path, command.edits, command.alone))
+    def perform(self, *commands: Command) -> None:
+        super().perform(*commands)
+        for command in commands:
+            if isinstance(command, show.OpenScene):
+                self.asked.append(LoadScene(command.path, command.edits, command.alone))
 
 
 def make_edit(desk: Desk, scene: Scene, number: int) -> None:
@@ -197,7 +198,7 @@ def rest(desk: Desk) -> None:
     for _ in range(2):  # the session names edits that are kept
         desk.pass_time(2 * KEEP_AFTER)
         desk.work()
-    desk.effects._writer.submit(lambda: None).result()
+    desk.written()
 
 
 def _count(desk: Desk) -> int:

@@ -10,7 +10,7 @@ import numpy as np
 
 from app.window.asking.prompt_sets import read_prompts
 from app.window.asking.state import PALETTE, Prompt
-from app.window.recovery import preferences, sessions
+from app.window.recovery import preferences, records
 from app.window.recovery.commands import restored_phrases
 from app.window.recovery.state import Kept
 from app.window.state import State
@@ -71,7 +71,7 @@ def _more(folder: Path) -> dict[str, bytes]:
                     {"text": Prompt(1).text or "x", "like": "00000000"}],
     }  # fmt: skip
     return made | {
-        "session-1.json": json.dumps(sessions.fields(kept)).encode(),
+        "session-1.json": records.told(kept),
         "preferences.json": json.dumps(asdict(preferences.DEFAULTS)).encode(),
         **_written(folder),
         "a.prompts.json": json.dumps(prompts).encode(),
@@ -123,7 +123,7 @@ def _posed(path: Path) -> object:
 
 
 def _session(path: Path) -> object:
-    kept = sessions.read(path)
+    kept = records.read(path)
     return None if kept is None else restored_phrases(State(), kept)
 
 

@@ -13,7 +13,7 @@ import random
 import time
 from collections.abc import Callable, Iterator
 from contextlib import suppress
-from dataclasses import replace
+from dataclasses import asdict, replace
 from pathlib import Path
 
 import numpy as np
@@ -129,7 +129,7 @@ def settings(folder: Path, rng: random.Random) -> list[str]:
             assert not said, said
             since = own
             time.sleep(rests.uniform(0, 0.002))
-        (folder / f"{number}.json").write_text(json.dumps(preferences.values_of(own)))
+        (folder / f"{number}.json").write_text(json.dumps(asdict(own)))
 
     finds = both(work)
     kept, complaint = preferences.load()

@@ -1,16 +1,17 @@
 """What can happen while asking: phrases, their answers, the dictionary."""
 
+from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from itertools import repeat, zip_longest
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from langflash_core.base import pictures
 from langflash_core.geometry.poses import Vector
 
 from ..state import State
 from .prompt_sets import MOST_PROMPTS, PromptSet
-from .state import LEAST_SPAN, MOST_RECENT, PALETTE, Histogram, Insight, Prompt
+from .state import LEAST_SPAN, MOST_RECENT, Histogram, Insight, Prompt, free_colour
 
 if TYPE_CHECKING:
     from torch import Tensor
@@ -21,7 +22,7 @@ if TYPE_CHECKING:
 def revise(state: State) -> State:
     """The state without scores: the Gaussians, the atoms or the negatives that they rest on are others."""
     prompts = tuple(replace(p, score=None) for p in state.asking.prompts)
-    return state.with_asking(prompts=prompts).with_asking(histograms=(), revision=state.asking.revision + 1)
+    return state.with_asking(prompts=prompts, histograms=(), revision=state.asking.revision + 1)
 
 
 # Phrases
@@ -32,12 +33,8 @@ class AddPrompt:
     """A new, empty row in a colour of its own, where the next letters go."""
 
     def apply(self, state: State) -> State:
-        used = {p.colour for p in state.asking.prompts}
-        free = [c for c in PALETTE if c not in used] or [PALETTE[len(state.asking.prompts) % len(PALETTE)]]
-        prompt = Prompt(state.next_key, colour=free[0])
-        prompts = (*state.asking.prompts, prompt)
-        state = replace(state.with_asking(prompts=prompts, active=prompt.key), next_key=state.next_key + 1)
-        return state.with_asking(caret=prompt.key)
+        prompt = Prompt(state.next_key, colour=free_colour(state.asking.prompts))
+        return with_prompt(state, state.asking.prompts, prompt).with_asking(caret=prompt.key)
 
 
 @dataclass(frozen=True)
@@ -49,7 +46,7 @@ class NextPrompt:
     def apply(self, state: State) -> State:
         empty = next((p for p in state.asking.prompts if not p.text.strip() and p.key != self.key), None)
         if empty is not None:
-            return state.with_asking(active=empty.key).with_asking(caret=empty.key)
+            return state.with_asking(active=empty.key, caret=empty.key)
         return state if len(state.asking.prompts) >= MOST_PROMPTS else AddPrompt().apply(state)
 
 
@@ -58,10 +55,9 @@ class FocusPhrase:
     """The next letters go to the active phrase."""
 
     def apply(self, state: State) -> State:
-        chosen = next(
-            (p for p in state.asking.prompts if p.key == state.asking.active), state.asking.prompts[0]
-        )
-        return state.with_asking(caret=chosen.key)
+        prompts, active = state.asking.prompts, state.asking.active
+        there = any(p.key == active for p in prompts)
+        return state.with_asking(caret=active if there else prompts[0].key)
 
 
 @dataclass(frozen=True)
@@ -84,7 +80,7 @@ class RemovePrompt:
             prompts = (Prompt(state.next_key),)
             state = replace(state, next_key=state.next_key + 1)
         active = state.asking.active if any(p.key == state.asking.active for p in prompts) else prompts[0].key
-        return _with_prompts(state.with_asking(active=active), prompts)
+        return state.with_asking(active=active, prompts=prompts)
 
 
 @dataclass(frozen=True)
@@ -99,8 +95,7 @@ class EditPrompt:
             state, self.key, text=self.text, score=None, like=b"", place=None, photo=None, note="", reading=""
         )
         first = not state.asking.asked and bool(after.asking.asked)
-        mode = pictures.HEAT if first and state.scene.mode is pictures.RGB else after.scene.mode
-        return after.with_scene(mode=mode).with_asking(active=self.key).with_asking(named=False)
+        return (with_heat(after) if first else after).with_asking(active=self.key, named=False)
 
 
 @dataclass(frozen=True)
@@ -190,25 +185,18 @@ class AskAgain:
     text: str
 
     def apply(self, state: State) -> State:
-        empty = next((p for p in state.asking.prompts if not p.text.strip()), None)
-        if empty is None and len(state.asking.prompts) >= MOST_PROMPTS:
+        prompts = state.asking.prompts
+        empty = next((p for p in prompts if not p.text.strip()), None)
+        if empty is None and len(prompts) >= MOST_PROMPTS:
             return state
-        prompts, key = state.asking.prompts, state.next_key
+        after = state if state.asking.asked else with_heat(state)
         if empty is None:
-            used = {p.colour for p in prompts}
-            colour = next((c for c in PALETTE if c not in used), PALETTE[len(prompts) % len(PALETTE)])
             calibrated = prompts[0].calibrated
-            prompts = (*prompts, Prompt(key, self.text, colour, calibrated=calibrated))
+            prompt = Prompt(state.next_key, self.text, free_colour(prompts), calibrated=calibrated)
+            after = with_prompt(after, prompts, prompt)
         else:
-            key = empty.key
-            asked = replace(empty, text=self.text, score=None, visible=True)
-            prompts = tuple(asked if p.key == key else p for p in prompts)
-        mode = (
-            pictures.HEAT if state.scene.mode is pictures.RGB and not state.asking.asked else state.scene.mode
-        )
-        after = replace(
-            state.with_asking(prompts=prompts, active=key).with_scene(mode=mode), next_key=state.next_key + 1
-        )
+            after = _change_prompt(after, empty.key, text=self.text, score=None, visible=True)
+            after = after.with_asking(active=empty.key)
         return Remember(self.text).apply(after.with_asking(named=False))
 
 
@@ -246,13 +234,9 @@ class PromptsRead:
             for place, p in enumerate(self.chosen.prompts)
         )
         mode = pictures.LABELS if state.scene.mode is pictures.RGB else state.scene.mode
-        state = replace(
-            state.with_asking(
-                prompts=prompts, active=first, negatives=self.chosen.negatives or state.asking.negatives
-            ).with_scene(mode=mode),
-            next_key=first + len(prompts),
-        )
-        return state.with_asking(prompts_path=self.path)
+        negatives = self.chosen.negatives or state.asking.negatives
+        state = state.with_asking(prompts=prompts, active=first, negatives=negatives, prompts_path=self.path)
+        return replace(state.with_scene(mode=mode), next_key=first + len(prompts))
 
 
 # Answers
@@ -270,13 +254,10 @@ class Answered:
     places: tuple[Vector | None, ...] = ()
 
     def apply(self, state: State) -> State:
-        if self.revision != state.asking.revision:
-            return state
-        current = {p.key: p.text.strip() for p in state.asking.prompts}
-        for (key, text, score), place in zip_longest(self.scores, self.places):
-            if current.get(key) == text:
-                state = _change_prompt(state, key, score=score, place=place)
-        return state
+        told = zip_longest(self.scores, self.places)
+        return _told(
+            state, self.revision, (((k, text), {"score": s, "place": at}) for (k, text, s), at in told)
+        )
 
 
 @dataclass(frozen=True)
@@ -290,13 +271,7 @@ class Narrowed:
     revision: int = 0
 
     def apply(self, state: State) -> State:
-        if self.revision != state.asking.revision:
-            return state
-        current = {p.key: p.text.strip() for p in state.asking.prompts}
-        for key, text, note in self.notes:
-            if current.get(key) == text:
-                state = _change_prompt(state, key, note=note)
-        return state
+        return _told(state, self.revision, (((key, text), {"note": note}) for key, text, note in self.notes))
 
 
 @dataclass(frozen=True)
@@ -318,9 +293,8 @@ class Calibrated:
     threshold: float
 
     def apply(self, state: State) -> State:
-        return _with_prompts(
-            state, tuple(replace(p, calibrated=self.threshold) for p in state.asking.prompts)
-        )
+        prompts = tuple(replace(p, calibrated=self.threshold) for p in state.asking.prompts)
+        return state.with_asking(prompts=prompts)
 
 
 @dataclass(frozen=True)
@@ -354,13 +328,9 @@ class PhrasesPlaced:
     revision: int = 0
 
     def apply(self, state: State) -> State:
-        if self.revision != state.asking.revision:
-            return state
-        current = {p.key: p.text.strip() for p in state.asking.prompts}
-        for key, text, photo in zip(self.keys, self.texts, self.photos, strict=True):
-            if current.get(key) == text:
-                state = _change_prompt(state, key, photo=photo)
-        return state
+        phrases = zip(self.keys, self.texts, strict=True)
+        told = ((phrase, {"photo": k}) for phrase, k in zip(phrases, self.photos, strict=True))
+        return _told(state, self.revision, told)
 
 
 @dataclass(frozen=True)
@@ -396,8 +366,7 @@ class OpenDictionary:
     opened: bool
 
     def apply(self, state: State) -> State:
-        wanted = replace(state.preferences, dictionary_open=self.opened)
-        return replace(state, preferences=wanted)
+        return replace(state, preferences=replace(state.preferences, dictionary_open=self.opened))
 
 
 @dataclass(frozen=True)
@@ -457,11 +426,28 @@ class ChooseNone:
         return state.with_asking(chosen=())
 
 
-def _with_prompts(state: State, prompts: tuple[Prompt, ...]) -> State:
-    return state.with_asking(prompts=prompts)
+def with_prompt(state: State, others: tuple[Prompt, ...], prompt: Prompt) -> State:
+    """With a new prompt, which is the active one, after others."""
+    state = state.with_asking(prompts=(*others, prompt), active=prompt.key)
+    return replace(state, next_key=prompt.key + 1)
+
+
+def with_heat(state: State) -> State:
+    """With the heat-map on, where colours are."""
+    return state.with_scene(mode=pictures.HEAT) if state.scene.mode is pictures.RGB else state
+
+
+def _told(state: State, revision: int, told: Iterable[tuple[tuple[int, str], dict[str, Any]]]) -> State:
+    """What was found of prompts, by key and text; nothing of another revision, or of one edited meanwhile."""
+    if revision != state.asking.revision:
+        return state
+    current = {(p.key, p.text.strip()) for p in state.asking.prompts}
+    for phrase, changes in told:
+        if phrase in current:
+            state = _change_prompt(state, phrase[0], **changes)
+    return state
 
 
 def _change_prompt(state: State, key: int, **changes) -> State:
-    return _with_prompts(
-        state, tuple(replace(p, **changes) if p.key == key else p for p in state.asking.prompts)
-    )
+    prompts = (replace(p, **changes) if p.key == key else p for p in state.asking.prompts)
+    return state.with_asking(prompts=tuple(prompts))

@@ -134,9 +134,7 @@ class AskingEffects(Effects):
         """Have the view on show scored, once it rests."""
         view = self._viewport.view(state)
         if view is not None:
-            seen = (view.relevance, view.frame, view.camera, view.query)
-            chosen = (view.others, view.up, view.cuts, view.name)
-            self._hands.submit(Answer(view.serial, view.keys, *seen, view.revision, *chosen))
+            self._hands.submit(Answer(view.serial, view))
 
 
 def _answer(state: State) -> tuple | None:

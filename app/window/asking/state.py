@@ -1,6 +1,7 @@
 """What asking adds to the state: phrases, the scores behind an answer, the dictionary."""
 
 import re
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -80,6 +81,12 @@ class Prompt:
     def shown_from(self) -> float:
         """Relevance from which its heat-map shows something: of a near miss, what comes nearest."""
         return self.lowest if self.maybe else self.cut
+
+
+def free_colour(prompts: Sequence[Prompt]) -> tuple[float, float, float]:
+    """One that none of these has, while there is one."""
+    used = {prompt.colour for prompt in prompts}
+    return next((colour for colour in PALETTE if colour not in used), PALETTE[len(prompts) % len(PALETTE)])
 
 
 EVEN = 0.5  # relevancy of what fits no better than what it is compared with

@@ -14,6 +14,7 @@ from langflash_core.scene.edits import Marks
 from langflash_core.scene.mask import Mask
 
 from ..commands import Command, Notify, ShowPicture
+from ..drawing.values import View
 from ..requests import Asked, SceneTask, Task
 from ..scene.memory import SceneMemory
 from .commands import (
@@ -33,8 +34,7 @@ from .state import BINS, Histogram, Insight, Part, Parts
 if TYPE_CHECKING:
     from torch import Tensor
 
-    from langflash_core.language.relevance import CompiledQuery
-    from langflash_core.types import Camera, Frame, Scene
+    from langflash_core.types import Scene
 
 
 @dataclass(frozen=True)
@@ -99,57 +99,40 @@ def _vector(content: bytes) -> "Tensor":
 
 @dataclass(frozen=True)
 class Answer(SceneTask):
-    """Score phrases in one view, of what they mean alone, and count how its pixels score.
-
-    others, up, cuts, name: as `View` of app/window/drawing/values.py.
-    """
+    """Score phrases in one view, of what they mean alone, and count how its pixels score."""
 
     newest_counts = True
 
-    keys: tuple[int, ...]
-    relevance: "Tensor"
-    frame: "Frame"
-    camera: "Camera"
-    query: "CompiledQuery"
-    revision: int = 0
-    others: "Tensor | None" = None
-    up: tuple[float, ...] = (0.0, -1.0, 0.0)
-    cuts: tuple[float, ...] = ()
-    name: tuple = ()
+    view: View
 
     def run(self, stopping: Asked) -> Iterator[Command]:
         from langflash_core.language.answers import answer, best_places
-
-        relevance, query = self.relevance, self.query
-        if query.narrows:
-            relevance, query = self._narrowed()
-            choosing = zip(self.keys, query.texts, query.notes, query.readings, strict=True)
-            notes = tuple((key, text, note) for key, text, note, reading in choosing if reading.narrows)
-            yield Narrowed(self.name, relevance, notes, self.revision)
-        result = answer(relevance, self.frame, self.camera, query)
-        answers = zip(self.keys, result.answers, strict=True)
-        scores = tuple((key, a.prompt, float(a.score)) for key, a in answers)
-        places = best_places(relevance, self.frame, self.camera)
-        yield Answered(scores, self.revision, tuple(p and Vector(*p) for p in places))
-        yield Binned(self.histograms(relevance), self.revision)
-
-    def _narrowed(self) -> "tuple[Tensor, CompiledQuery]":
         from langflash_core.language.narrowing import narrow_view
 
-        limits = self.cuts or (self.query.threshold,) * len(self.keys)
-        up = np.array(self.up)
-        return narrow_view(self.query, self.relevance, self.others, self.frame, self.camera, up, limits)
+        view, revision = self.view, self.view.revision
+        relevance, query = view.relevance, view.query
+        if query.narrows:
+            limits = view.cuts or (query.threshold,) * len(view.keys)
+            seen = (relevance, view.others, view.frame, view.camera, np.array(view.up))
+            relevance, query = narrow_view(query, *seen, limits)
+            choosing = zip(view.keys, query.texts, query.notes, query.readings, strict=True)
+            notes = tuple((key, text, note) for key, text, note, reading in choosing if reading.narrows)
+            yield Narrowed(view.name, relevance, notes, revision)
+        result = answer(relevance, view.frame, view.camera, query)
+        answers = zip(view.keys, result.answers, strict=True)
+        scores = tuple((key, a.prompt, float(a.score)) for key, a in answers)
+        places = best_places(relevance, view.frame, view.camera)
+        yield Answered(scores, revision, tuple(p and Vector(*p) for p in places))
+        yield Binned(tuple(self._histograms(relevance)), revision)
 
-    def histograms(self, relevance: "Tensor") -> tuple[Histogram, ...]:
+    def _histograms(self, relevance: "Tensor") -> Iterator[Histogram]:
         """How many covered pixels of the view score how high, by phrase."""
         from langflash_core.language.settings import ANSWERING
 
-        covered = self.frame.alphas >= ANSWERING.covered_alpha
-        made = []
-        for key, text, own in zip(self.keys, self.query.texts, relevance, strict=True):
+        covered = self.view.frame.alphas >= ANSWERING.covered_alpha
+        for key, text, own in zip(self.view.keys, self.view.query.texts, relevance, strict=True):
             counts, _ = np.histogram(own[covered].numpy(), BINS, (0.0, 1.0))
-            made.append(Histogram(key, text, tuple(int(n) for n in counts)))
-        return tuple(made)
+            yield Histogram(key, text, tuple(int(n) for n in counts))
 
 
 @dataclass(frozen=True)

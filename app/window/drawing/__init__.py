@@ -1,5 +1,5 @@
 """What draws a scene into the viewport: `card`, or where OpenGL runs on the processor `processor`, behind one
-protocol (`picture`). Both show what stands on an `easel`; a processor's still pictures come from `stills`.
+class (`picture`). Both show what stands on an `easel`; a processor's still pictures come from `stills`.
 
 `card`, `processor`, `easel` and `stills` load torch; `picture`, `values` and `marked` do not.
 """

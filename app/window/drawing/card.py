@@ -8,18 +8,15 @@ from ...gl import SplatRenderer
 from ..governor import Governor
 from ..state import State
 from .easel import Easel
-from .marked import Marked
-from .values import Numbers, Stand, View, kind_of
+from .picture import ScenePicture
+from .values import Stand, View, kind_of
 
 if TYPE_CHECKING:
-    from langflash_core.language.relevance import CompiledQuery
     from langflash_core.types import Scene
 
 
-class CardPicture:
-    """As `ScenePicture`: smaller pictures while something moves, and finer ones step by step at rest."""
-
-    settling = failing = False
+class CardPicture(ScenePicture):
+    """Smaller pictures while something moves, and finer ones step by step at rest."""
 
     def __init__(self, renderer: SplatRenderer, serial: int, scene: "Scene") -> None:
         """
@@ -28,12 +25,6 @@ class CardPicture:
         """
         self.governor = Governor(len(scene.gaussians), slow=False, coarse=coarse_share(scene))
         self.easel = Easel(renderer, serial, scene, self.governor.share)
-
-    def ask(self, keys: tuple[int, ...], query: "CompiledQuery | None", revision: int) -> None:
-        self.easel.ask(keys, query, revision)
-
-    def mark(self, marked: Marked) -> None:
-        self.easel.mark(marked)
 
     def update(self, state: State, stand: Stand, touched: float) -> float:
         kind = kind_of(state)
@@ -50,14 +41,4 @@ class CardPicture:
         return self.governor.next_rest(still)
 
     def view(self, state: State, stand: Stand) -> View | None:
-        return self.easel.view(state, stand, self._numbers)
-
-    def _numbers(self) -> Numbers:
-        return self.easel.numbers()
-
-    @property
-    def whole(self) -> bool:
-        return self.easel.finest
-
-    def release(self, patience: float) -> None:
-        pass
+        return self.easel.view(state, stand, self.easel.numbers)

@@ -10,7 +10,7 @@ from ...gl import SplatRenderer
 from ..governor import SETTLE_AFTER, Governor, Kind
 from ..state import State
 from .easel import Easel
-from .marked import Marked
+from .picture import ScenePicture
 from .stills import Stills
 from .values import Drawn, Stand, View, kind_of
 
@@ -28,8 +28,8 @@ def governor_of(scene: "Scene") -> Governor:
     return Governor(len(scene.gaussians), slow=True, coarse=coarse_share(scene))
 
 
-class ProcessorPicture:
-    """As `ScenePicture`: small pictures at once, still ones beside the frames."""
+class ProcessorPicture(ScenePicture):
+    """Small pictures at once, still ones beside the frames."""
 
     def __init__(
         self,
@@ -54,11 +54,8 @@ class ProcessorPicture:
         self._carried = True  # whether Gaussians have their numbers for the query
 
     def ask(self, keys: tuple[int, ...], query: "CompiledQuery | None", revision: int) -> None:
-        self.easel.ask(keys, query, revision)
+        super().ask(keys, query, revision)
         self._carried = query is None
-
-    def mark(self, marked: Marked) -> None:
-        self.easel.mark(marked)
 
     def update(self, state: State, stand: Stand, touched: float) -> float:
         kind, still = kind_of(state), state.now - stand.moved

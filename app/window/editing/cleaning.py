@@ -67,6 +67,12 @@ def free_names(rule: Rule) -> tuple[str, ...]:
     return tuple(name for name in (*MEASURES, COLOUR) if name not in rule)
 
 
+def as_sentence(problem: Exception) -> str:
+    """An error for people."""
+    said = str(problem)
+    return f"{said[:1].upper()}{said[1:]}."
+
+
 @dataclass(frozen=True)
 class ShowRules:
     """The rules of the clean-up beside its strength, or no longer; begins a preview where there is none."""
@@ -92,7 +98,7 @@ class ChangeRecipe:
         try:
             recipe = replace(preview.recipe, **self.changes)
         except InputError as problem:
-            return Notify(str(problem)[:1].upper() + str(problem)[1:] + ".").apply(state)
+            return Notify(as_sentence(problem)).apply(state)
         return state.with_editing(floaters=replace(preview, recipe=recipe))
 
 

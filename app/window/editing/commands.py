@@ -1,5 +1,6 @@
 """What can happen while editing. Every change of the scene is an entry of the history."""
 
+from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 from langflash_core.base import pictures
@@ -138,8 +139,7 @@ class SelectAll:
     """Select everything that is shown."""
 
     def apply(self, state: State) -> State:
-        marks = state.editing.marks
-        return state if marks is None else with_edit(state, "Select all", edits.select(marks, marks.visible))
+        return _edited(state, "Select all", lambda marks: edits.select(marks, marks.visible))
 
 
 @dataclass(frozen=True)
@@ -147,10 +147,7 @@ class Deselect:
     """Select nothing."""
 
     def apply(self, state: State) -> State:
-        marks = state.editing.marks
-        if marks is None:
-            return state
-        return with_edit(state, "Deselect", edits.select(marks, Mask.none(marks.deleted.count)))
+        return _edited(state, "Deselect", lambda marks: edits.select(marks, Mask.none(marks.deleted.count)))
 
 
 @dataclass(frozen=True)
@@ -158,8 +155,7 @@ class Invert:
     """Select what is shown and not selected."""
 
     def apply(self, state: State) -> State:
-        marks = state.editing.marks
-        return state if marks is None else with_edit(state, "Invert the selection", edits.invert(marks))
+        return _edited(state, "Invert the selection", edits.invert)
 
 
 # Changing the scene
@@ -194,8 +190,7 @@ class ShowAll:
     """Show what was hidden."""
 
     def apply(self, state: State) -> State:
-        marks = state.editing.marks
-        return state if marks is None else with_edit(state, "Show everything", edits.show_all(marks))
+        return _edited(state, "Show everything", edits.show_all)
 
 
 @dataclass(frozen=True)
@@ -206,15 +201,9 @@ class RenameAtom:
     name: str
 
     def apply(self, state: State) -> State:
-        marks = state.editing.marks
-        if marks is None or not 0 <= self.atom < len(marks.atoms):
-            return state
-        label = (
-            f"Name group {self.atom} {self.name.strip()!r}"
-            if self.name.strip()
-            else f"Unname group {self.atom}"
-        )
-        return with_edit(state, label, edits.rename_atom(marks, self.atom, self.name))
+        name = self.name.strip()
+        label = f"Name group {self.atom} {name!r}" if name else f"Unname group {self.atom}"
+        return _edited(state, label, lambda marks: edits.rename_atom(marks, self.atom, self.name), self.atom)
 
 
 @dataclass(frozen=True)
@@ -225,11 +214,8 @@ class DenyAtom:
     text: str
 
     def apply(self, state: State) -> State:
-        marks = state.editing.marks
-        if marks is None or not 0 <= self.atom < len(marks.atoms):
-            return state
-        marks = edits.deny_atom(marks, self.atom, self.text)
-        return with_edit(state, f"Group {self.atom} is not {self.text.strip()!r}", marks)
+        label = f"Group {self.atom} is not {self.text.strip()!r}"
+        return _edited(state, label, lambda marks: edits.deny_atom(marks, self.atom, self.text), self.atom)
 
 
 @dataclass(frozen=True)
@@ -239,11 +225,10 @@ class MergeAtoms:
     atoms: tuple[int, ...]
 
     def apply(self, state: State) -> State:
-        marks = state.editing.marks
-        if marks is None or not self.atoms or not all(0 <= k < len(marks.atoms) for k in self.atoms):
+        if not self.atoms:
             return state
         label = "Merge groups " + ", ".join(map(str, self.atoms))
-        return with_edit(state, label, edits.merge_atoms(marks, self.atoms))
+        return _edited(state, label, lambda marks: edits.merge_atoms(marks, self.atoms), *self.atoms)
 
 
 @dataclass(frozen=True)
@@ -363,6 +348,14 @@ class EndFloaters:
         if self.then == "select":
             return with_edit(state, f"Select {what}", edits.select(marks, found))
         return state
+
+
+def _edited(state: State, label: str, make: Callable[[Marks], Marks], *atoms: int) -> State:
+    """After an edit of the marks, those of these atoms where they are known."""
+    marks = state.editing.marks
+    if marks is None or not all(0 <= k < len(marks.atoms) for k in atoms):
+        return state
+    return with_edit(state, label, make(marks))
 
 
 def _on_selection(state: State, verb: str, make) -> State:

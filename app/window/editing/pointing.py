@@ -4,12 +4,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from langflash_core.base import pictures
 from langflash_core.geometry import poses
 from langflash_core.geometry.poses import Vector
 from langflash_core.scene.edits import Combine
 
-from ..asking.state import PALETTE, Prompt
+from ..asking.commands import with_heat, with_prompt
+from ..asking.state import Prompt, free_colour
 from ..scene.state import Flight
 from ..state import State
 from .commands import with_edit
@@ -220,16 +220,9 @@ class FindSimilar:
         word = card.words[0][0] if card.words else ""
         text = f"{LIKE_THIS} ({word})" if word else LIKE_THIS
         empty = next((p for p in state.asking.prompts if not p.text.strip()), None)
-        used = {p.colour for p in state.asking.prompts if p is not empty}
-        free = [c for c in PALETTE if c not in used] or [PALETTE[len(state.asking.prompts) % len(PALETTE)]]
-        prompt = Prompt(state.next_key, text, free[0], LIKE_THRESHOLD, like=card.vector)
-        prompts = (*(p for p in state.asking.prompts if p is not empty), prompt)
-        mode = pictures.HEAT if state.scene.mode is pictures.RGB else state.scene.mode
-        state = replace(
-            state.with_asking(prompts=prompts, active=prompt.key).with_scene(mode=mode),
-            next_key=state.next_key + 1,
-        )
-        return state.with_editing(card=None)
+        others = tuple(p for p in state.asking.prompts if p is not empty)
+        prompt = Prompt(state.next_key, text, free_colour(others), LIKE_THRESHOLD, like=card.vector)
+        return with_heat(with_prompt(state, others, prompt)).with_editing(card=None)
 
 
 @dataclass(frozen=True)

@@ -22,6 +22,7 @@ from ..requests import Asked, SceneTask
 from ..scene.memory import SceneMemory
 from ..scene.state import SceneInfo
 from ..state import State
+from .cleaning import as_sentence
 from .commands import (
     FloatersFound,
     Found,
@@ -32,7 +33,7 @@ from .commands import (
     SelectSphere,
     SelectThing,
     StopWaiting,
-)  # fmt: skip
+)
 from .mending import MarginsFound
 from .pointing import AtomsNamed, Named, ReadingTaken
 from .state import BY_STRENGTH, PICK_RADIUS, Outline, Point, Reading, Region, strongest
@@ -313,7 +314,7 @@ class ScoreFloaters(EditTask):
         except LangFlashError as problem:
             none = Mask.none(visible.count)
             yield FloatersFound(least, recipe, answering=none)
-            yield Notify(str(problem)[:1].upper() + str(problem)[1:] + ".")
+            yield Notify(as_sentence(problem))
 
     def _by_rules(self, shown: "Scene") -> "tuple[Mask | None, Mask | None, Mask | None, Box | None]":
         """What meets a rule, what answers its phrases, what is outside its box, and that."""
@@ -322,15 +323,13 @@ class ScoreFloaters(EditTask):
 
         recipe, about = self.recipe, (self.marks.changes,)
         ruled = spoken = outside = box = None
+
+        def measured(name: str) -> np.ndarray:
+            return self.memory.answered(f"measure {name}", about, lambda: measure_gaussians(shown, name))
+
         for rule in recipe.rules:
-            rows = meeting(
-                shown,
-                rule,
-                lambda name: self.memory.answered(
-                    f"measure {name}", about, lambda: measure_gaussians(shown, name)
-                ),
-            )
-            ruled = Mask.of(rows) if ruled is None else ruled | Mask.of(rows)
+            rows = Mask.of(meeting(shown, rule, measured))
+            ruled = rows if ruled is None else ruled | rows
         if recipe.within:
             spoken = Mask.of(answering(self.spoken(), recipe.within))
         if recipe.crop is not None:
@@ -392,16 +391,8 @@ def _phrase(state: State, info: SceneInfo, marks: Marks, key: int, combine: Comb
     prompt = next((p for p in state.asking.prompts if p.key == key and p.text.strip()), None)
     if prompt is None or not info.num_atoms:
         return None
-    return FindByPhrase(
-        info.serial,
-        info.memory,
-        marks,
-        prompt.text.strip(),
-        prompt.like,
-        state.asking.negatives,
-        prompt.threshold,
-        combine,
-    )
+    asked = (prompt.text.strip(), prompt.like, state.asking.negatives, prompt.threshold)
+    return FindByPhrase(info.serial, info.memory, marks, *asked, combine)
 
 
 # Places and words
@@ -494,14 +485,12 @@ class NameAtoms(EditTask):
         near = [nearest_words(d, words, embeddings, WORDS_OF_ATOM) for d in self.dictionary()]
         named = tuple(tuple(each.word for each in row) for row in near)
         asked = list(dict.fromkeys(row[0] for row in named if row))
-        found = tuple[str, ...]()
+        best = []
         if asked:
             shares = answering_shares(spoken, compile_query(spoken, language_space(space), asked))
             best = shares.amax(1).tolist()
-            found = tuple(
-                word for word, share in zip(asked, best, strict=True) if share >= ANSWERING.top_fraction
-            )
-        yield AtomsNamed(named, found)
+        answered = zip(asked, best, strict=True)
+        yield AtomsNamed(named, tuple(word for word, share in answered if share >= ANSWERING.top_fraction))
 
 
 @dataclass(frozen=True)
@@ -547,18 +536,12 @@ class FindLessons(EditTask):
             yield StopWaiting()
 
 
-def household_words() -> tuple[str, ...]:
-    """The names of things in a room that the project knows."""
-    from langflash_core.language.vocabulary import OWN
-
-    return tuple(OWN)
-
-
 @lru_cache(maxsize=4)
 def _household(space: str):
     from langflash_core.language.spaces import language_space
+    from langflash_core.language.vocabulary import OWN
 
-    return language_space(space).encode(list(household_words()))
+    return language_space(space).encode(list(OWN))
 
 
 def _readable(space: str, text: str) -> bool:
@@ -579,8 +562,9 @@ def _vocabulary(space: str, extra: tuple[str, ...]):
 
     from langflash_core.language.algebra import encode_prompts
     from langflash_core.language.spaces import language_space
+    from langflash_core.language.vocabulary import OWN
 
-    known = household_words()
+    known = tuple(OWN)
     asked = dict.fromkeys(text for text in extra if text and text not in known)
     own = tuple(text for text in asked if _readable(space, text))
     if not own:

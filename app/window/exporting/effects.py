@@ -11,7 +11,7 @@ from ..commands import Command, Notify
 from ..dialogs import Dialog
 from ..effects import Effects, Hands
 from ..recovery.commands import CopyKept
-from ..recovery.keeper import Keeper
+from ..recovery.records import Keeper
 from ..recovery.work import KeepCopy
 from ..scene.commands import SceneArrived
 from ..state import State

@@ -7,6 +7,8 @@ from typing import Generic, NamedTuple, TypeVar
 from imgui_bundle import ImVec2, ImVec4, imgui
 from imgui_bundle import icons_fontawesome_6 as fa
 
+from langflash_core.scene.edits import Combine
+
 from . import theme
 from .look import Look
 
@@ -32,6 +34,25 @@ def window(name: str, pos: ImVec2, size: ImVec2, flags: int = 0, scrolls: bool =
         yield
     finally:
         imgui.end()
+
+
+@contextmanager
+def floating(
+    name: str, look: Look, padding: tuple[float, float] | None = None, flags: int = 0
+) -> Iterator[None]:
+    """A rounded window over the picture, in the ground of popups, that takes no keys as it comes. padding:
+    design pixels; None: the style's."""
+    imgui.push_style_var(imgui.StyleVar_.window_rounding, look.px(8))
+    imgui.push_style_var(
+        imgui.StyleVar_.window_padding, look.vec(*padding) if padding else imgui.get_style().window_padding
+    )
+    with colours(window_bg=imgui.get_style().color_(imgui.Col_.popup_bg)):
+        imgui.begin(name, None, PLAIN | imgui.WindowFlags_.no_focus_on_appearing | flags)
+        try:
+            yield
+        finally:
+            imgui.end()
+            imgui.pop_style_var(2)
 
 
 def to_front() -> None:
@@ -121,6 +142,13 @@ def answers(look: Look, *given: Answer[_Value], default: int = 0) -> list[_Value
     return issued
 
 
+def toggle(label: str, on: bool, tip: str = "", size: ImVec2 | None = None) -> bool:
+    """A button that stands out while what it says is so; whether it was pressed."""
+    pressed = primary_button(label, size) if on else imgui.button(label, size or ImVec2(0, 0))
+    tooltip(tip)
+    return pressed
+
+
 def default_button(label: str, size: ImVec2 | None = None, confirmed: bool = False) -> bool:
     """The primary button of a dialog, which Enter presses too, unless the keys are on another control.
     confirmed: Enter has ended what is typed in the field that the dialog is about."""
@@ -151,7 +179,7 @@ def choice(options: Sequence[tuple[str, _Value]], chosen: _Value) -> _Value:
     for index, (label, value) in enumerate(options):
         if index:
             beside(button_width(label), 0.5 * imgui.get_style().item_spacing.x)
-        if primary_button(label) if value == chosen else imgui.button(label):
+        if toggle(label, value == chosen):
             chosen = value
     imgui.end_group()
     return chosen
@@ -221,6 +249,20 @@ def takes_clicks(name: str) -> bool:
         new = now - storage.get_float(since) < _NEW_SECONDS or frame - storage.get_int(first) < _NEW_FRAMES
         storage.set_bool(early, new)
     return not (storage.get_bool(early) and imgui.is_mouse_released(0))
+
+
+def section(label: str, opened: bool = True) -> bool:
+    """A quiet line that shows or hides what follows; whether it is shown."""
+    shape = imgui.TreeNodeFlags_.no_tree_push_on_open | imgui.TreeNodeFlags_.span_avail_width
+    begins = imgui.TreeNodeFlags_.default_open if opened else imgui.TreeNodeFlags_.none
+    with colours(text=theme.MUTED):
+        return imgui.tree_node_ex(label, shape | begins)
+
+
+def column(x: float) -> None:
+    """Go on in the same line at `x` of the window, as the cursor counts it."""
+    imgui.same_line()
+    imgui.set_cursor_pos_x(x)
 
 
 def folder_room() -> float:
@@ -362,6 +404,12 @@ def at_right_edge(text: str) -> None:
     edge = imgui.get_cursor_pos_x() + imgui.get_content_region_avail().x
     imgui.same_line(edge - imgui.calc_text_size(text).x)
     imgui.text(text)
+
+
+def combined(usual: Combine) -> Combine:
+    """What a selection does with the keys that are held now."""
+    io = imgui.get_io()
+    return "add" if io.key_shift else "remove" if io.key_ctrl else usual
 
 
 def pointer(corner: ImVec2) -> tuple[float, float]:

@@ -6,7 +6,6 @@ from itertools import zip_longest
 from pathlib import Path
 
 from langflash_core.base.pictures import NAMED
-from langflash_core.geometry.poses import Pose
 
 from ..asking.state import PALETTE, Prompt
 from ..commands import Notify
@@ -14,7 +13,7 @@ from ..scene.commands import scene_photos
 from ..scene.state import Photo
 from ..state import State
 from .preferences import PANEL_WIDTHS, SCALES, SPEEDS, Preferences
-from .state import Kept, KeptPhoto, Offer, Project
+from .state import Kept, KeptPhoto, Offer
 
 # Preferences
 
@@ -57,7 +56,7 @@ class ForgetRecent:
     def apply(self, state: State) -> State:
         recent, projects = state.preferences.recent, state.recovery.projects
         left = () if self.path is None else tuple(each for each in recent if each != self.path)
-        state = state.with_recovery(projects=tuple(each for each in projects if each.path in left))
+        state = state.with_recovery(projects=tuple(each for each in projects if each.scene in left))
         return replace(state, preferences=replace(state.preferences, recent=left))
 
 
@@ -68,11 +67,11 @@ class ForgetRecent:
 class ProjectsRead:
     """What is remembered of the recent scenes that are still there, the newest first."""
 
-    projects: tuple[Project, ...]
+    projects: tuple[Kept, ...]
 
     def apply(self, state: State) -> State:
         recent = state.preferences.recent
-        return state.with_recovery(projects=tuple(each for each in self.projects if each.path in recent))
+        return state.with_recovery(projects=tuple(each for each in self.projects if each.scene in recent))
 
 
 @dataclass(frozen=True)
@@ -116,9 +115,8 @@ class StandAsLeft:
         if state.scene.info is None:
             return state
         kept = self.kept
-        state = restored_tray(state, tuple(zip(kept.photos, kept.fovs, strict=True)), kept.missing)
-        state = restored_phrases(state, kept)
-        return StandAgain(kept.pose, kept.mode, kept.name, saved=True).apply(state)
+        state = restored_phrases(restored_tray(state, kept.tray, kept.missing), kept)
+        return StandAgain(kept).apply(state)
 
 
 # A session that ended badly
@@ -155,8 +153,7 @@ class EndSessionOffer:
         state = state.with_recovery(session=None)
         if kept is None or not self.restore:
             return state
-        state = restored_tray(state, tuple(zip(kept.photos, kept.fovs, strict=True)), kept.missing)
-        return restored_phrases(state, kept)
+        return restored_phrases(restored_tray(state, kept.tray, kept.missing), kept)
 
 
 def restored_tray(state: State, photos: Iterable[KeptPhoto], missing: Sequence[str]) -> State:
@@ -169,18 +166,17 @@ def restored_tray(state: State, photos: Iterable[KeptPhoto], missing: Sequence[s
     return Notify(text, "info").apply(state)
 
 
-def kept_photos(state: State) -> tuple[KeptPhoto, ...]:
-    """The photos of the scene on show, to be kept with it."""
-    return tuple((str(photo.path), photo.fov) for photo in scene_photos(state))
+def kept_photos(photos: Iterable[Photo]) -> tuple[KeptPhoto, ...]:
+    """As they are kept."""
+    return tuple((str(photo.path), photo.fov) for photo in photos)
 
 
 def kept_session(state: State, scene: Path | None) -> Kept:
     """What is kept of the tray, the phrases and the view. scene: where the scene on show lies, if it does."""
     info, prompts = state.scene.info, [prompt for prompt in state.asking.prompts if prompt.text.strip()]
-    return Kept(
-        photos=tuple(str(photo.path) for photo in state.scene.photos),
-        fovs=tuple(photo.fov for photo in state.scene.photos),
+    kept = Kept(
         scene="" if scene is None else str(scene),
+        edits="" if state.recovery.kept is None else str(state.recovery.kept),
         saved=info is None or info.path is not None,
         name="" if info is None else info.name,
         phrases=tuple(prompt.text for prompt in prompts),
@@ -190,7 +186,10 @@ def kept_session(state: State, scene: Path | None) -> Kept:
         visible=tuple(prompt.visible for prompt in prompts),
         mode=state.scene.mode.name,
         pose=None if info is None else state.scene.pose,
+        aside=None if state.scene.aside is None else kept_photos(state.scene.aside),
+        views=0 if info is None else len(info.views),
     )
+    return kept.with_photos(kept_photos(state.scene.photos))
 
 
 def restored_phrases(state: State, kept: Kept) -> State:
@@ -211,20 +210,18 @@ def restored_phrases(state: State, kept: Kept) -> State:
 
 @dataclass(frozen=True)
 class StandAgain:
-    """The camera and the mode of a kept session, once its scene is there. name: what it was called;
-    saved: whether its file is the person's own."""
+    """The camera and the mode of a kept session, once its scene is there; a scene that nobody saved is called
+    what it was called."""
 
-    pose: Pose | None
-    mode: str
-    name: str
-    saved: bool
+    kept: Kept
 
     def apply(self, state: State) -> State:
-        if state.scene.info is None:
+        info, kept = state.scene.info, self.kept
+        if info is None:
             return state
-        info = state.scene.info if self.saved else replace(state.scene.info, name=self.name, path=None)
-        mode = NAMED.get(self.mode.lower(), state.scene.mode)  # earlier versions wrote capitals
-        pose = self.pose or state.scene.pose
+        info = info if kept.saved else replace(info, name=kept.name, path=None)
+        mode = NAMED.get(kept.mode.lower(), state.scene.mode)  # earlier versions wrote capitals
+        pose = kept.pose or state.scene.pose
         view = state.scene.view if pose == state.scene.pose else None
         return state.with_scene(info=info, mode=mode, pose=pose, view=view)
 

@@ -16,6 +16,7 @@ from langflash_core.scene.edits import History
 
 from ...places import state_folder
 from ..scene.drops import SCENE_SUFFIX, still_there
+from .records import forget, forget_exported, newest_first
 from .state import KeptPhoto, Offer
 
 if TYPE_CHECKING:
@@ -54,35 +55,33 @@ def keep(
     where = None if path is None else str(path)
     about = {"name": name, "path": where, "photos": [list(photo) for photo in photos]}
     save_history(history, scene, about, edits)
-    for old in _newest_first()[MOST_KEPT:]:
-        forget_file(old)
+    for old in newest_first(f"*{SUFFIX}")[MOST_KEPT:]:
+        forget(old)
     return edits
 
 
-def forget(scene: "Scene", token: str) -> None:
+def forget_edits(scene: "Scene", token: str) -> None:
     """Remove the edits that a session kept of a scene; nothing there is fine."""
     from langflash_core.scene.edits_file import scene_digest
 
-    forget_file(_place(scene_digest(scene), token))
+    forget(_place(scene_digest(scene), token))
 
 
-def forget_file(edits: Path) -> None:
-    """Remove a file of edits with its scene; nothing there is fine."""
-    for file in (edits, edits.with_suffix(SCENE_SUFFIX)):
-        with suppress(OSError):
-            file.unlink(missing_ok=True)
-
-
-def forget_scene(scene: "Scene | None", paths: Collection[Path]) -> None:
-    """Remove the edits that all sessions kept of a scene, found by its content or its paths."""
+def forget_scene(scene: "Scene | None", paths: Collection[Path], copies: Iterable[Path] = ()) -> None:
+    """Remove all that any session kept of a scene, found by its content or its paths; of this session its
+    `copies`, and of those that ended badly what they exported."""
     from langflash_core.scene.edits_file import read_about, scene_digest
 
     digest, names = None if scene is None else scene_digest(scene), {str(path) for path in paths}
-    for edits in _newest_first():
+    for edits in newest_first(f"*{SUFFIX}"):
         with suppress(SceneFileError):
             found, about, _ = read_about(edits)
             if found == digest or about.get("path") in names:
-                forget_file(edits)
+                forget(edits)
+    for file in copies:
+        with suppress(OSError):
+            file.unlink(missing_ok=True)
+    forget_exported()
 
 
 def find(scene: "Scene | None" = None, path: Path | None = None) -> Offer | None:
@@ -90,7 +89,7 @@ def find(scene: "Scene | None" = None, path: Path | None = None) -> Offer | None
     from langflash_core.scene.edits_file import read_about, scene_digest
 
     wanted = None if scene is None else scene_digest(scene)
-    for edits in _newest_first():
+    for edits in newest_first(f"*{SUFFIX}"):
         with suppress(SceneFileError, OSError):  # what is damaged, or went meanwhile, is passed over
             digest, about, count = read_about(edits)
             ours = path is not None and about.get("path") == str(path)
@@ -112,13 +111,3 @@ def _tray(entries: object) -> tuple[tuple[KeptPhoto, ...], tuple[str, ...]]:
 
 def _place(digest: str, token: str) -> Path:
     return state_folder() / f"{digest[:20]}-{token}{SUFFIX}"
-
-
-def _newest_first() -> list[Path]:
-    """Kept edits; none where the folder cannot be looked into, and without those that go meanwhile."""
-    found = []
-    with suppress(OSError):
-        for file in state_folder().glob(f"*{SUFFIX}"):
-            with suppress(OSError):
-                found.append((file.stat().st_mtime, file))
-    return [file for _, file in sorted(found, reverse=True)]

@@ -20,6 +20,7 @@ from .preferences import SPEEDS, THEMES
 _LABELS = 190.0  # design pixels
 _EDITS_OFFER, _ANSWER, _NAME = 470.0, 108.0, 180.0  # design pixels wide; its buttons; a scene's name
 _OFFER = 480.0  # design pixels
+_SIZES = (0.75, 1.0, 1.25, 1.5, 2.0)  # of the interface
 _OF_TOOLS = ("##card", "##ruler", "##keys", "Rules")  # windows, beside their bars
 _DETAIL_TIP = (
     "How fine the next scene will be\nnormal: about 240,000 Gaussians from two photos\n"
@@ -29,20 +30,16 @@ _DETAIL_TIP = (
 
 def draw_settings(state: State, look: Look) -> list[do.Command]:
     """The preferences; each takes effect at once."""
-    old = state.preferences
-    new = old
-    _label("Theme", look)
-    new = replace(new, theme=widgets.choice([(name.capitalize(), name) for name in THEMES], old.theme))
-    _label("Colour map", look)
-    new = replace(new, colormap=widgets.choice([(name, name) for name in COLOUR_MAPS], old.colormap))
-    _label("Detail of new scenes", look)
-    imgui.begin_group()
-    new = replace(new, detail=widgets.choice([(name.capitalize(), name) for name in DETAILS], old.detail))
-    imgui.end_group()
-    widgets.tooltip(_DETAIL_TIP)
-    _label("Interface size", look)
-    sizes = [(f"{scale:.0%}", scale) for scale in (0.75, 1.0, 1.25, 1.5, 2.0)]
-    new = replace(new, scale=widgets.choice(sizes, old.scale))
+    new = old = state.preferences
+    for label, name, options, tip in (
+        ("Theme", "theme", [(name.capitalize(), name) for name in THEMES], ""),
+        ("Colour map", "colormap", [(name, name) for name in COLOUR_MAPS], ""),
+        ("Detail of new scenes", "detail", [(name.capitalize(), name) for name in DETAILS], _DETAIL_TIP),
+        ("Interface size", "scale", [(f"{scale:.0%}", scale) for scale in _SIZES], ""),
+    ):
+        _label(label, look)
+        new = replace(new, **{name: widgets.choice(options, getattr(old, name))})
+        widgets.tooltip(tip)
     _label("Flying speed", look)
     width = imgui.get_content_region_avail().x
     changed, speed = widgets.slider("##speed", old.speed, SPEEDS, f"{old.speed:.1f}", "", width)
@@ -83,20 +80,15 @@ def draw_offer(state: State, look: Look, place: ImVec2, size: ImVec2) -> list[do
     middle = ImVec2(place.x + size.x / 2, place.y + look.px(16))
     imgui.set_next_window_pos(middle, 0, ImVec2(0.5, 0))
     imgui.set_next_window_size(ImVec2(min(look.px(_OFFER), size.x - look.px(24)), 0))
-    imgui.push_style_var(imgui.StyleVar_.window_rounding, look.px(8))
-    imgui.push_style_color(imgui.Col_.window_bg, theme.POPUP)
-    imgui.begin("##session", None, widgets.PLAIN | imgui.WindowFlags_.no_focus_on_appearing)
-    imgui.text_wrapped("LangFlash did not close properly last time. It had open:")
-    widgets.muted(kept.sentence())
-    widgets.gap(look.px(2))
-    if widgets.primary_button("Restore", look.vec(140, 0)):
-        issued.append(keep.EndSessionOffer(restore=True))
-    imgui.same_line()
-    if imgui.button("Discard", look.vec(120, 0)):
-        issued.append(keep.EndSessionOffer(restore=False))
-    imgui.end()
-    imgui.pop_style_color()
-    imgui.pop_style_var()
+    with widgets.floating("##session", look):
+        imgui.text_wrapped("LangFlash did not close properly last time. It had open:")
+        widgets.muted(kept.sentence())
+        widgets.gap(look.px(2))
+        if widgets.primary_button("Restore", look.vec(140, 0)):
+            issued.append(keep.EndSessionOffer(restore=True))
+        imgui.same_line()
+        if imgui.button("Discard", look.vec(120, 0)):
+            issued.append(keep.EndSessionOffer(restore=False))
     return issued
 
 
@@ -113,9 +105,7 @@ def draw_edits_offer(state: State, look: Look, place: ImVec2, size: ImVec2) -> l
     middle = (box[0] + box[2]) / 2
     imgui.set_next_window_pos(ImVec2(middle, box[3] if pivot else box[1]), 0, ImVec2(0.5, pivot))
     imgui.set_next_window_size(ImVec2(box[2] - box[0], 0))
-    imgui.push_style_var(imgui.StyleVar_.window_rounding, look.px(8))
-    with widgets.colours(window_bg=imgui.get_style().color_(imgui.Col_.popup_bg)):
-        imgui.begin("##offer", None, widgets.PLAIN | imgui.WindowFlags_.no_focus_on_appearing)
+    with widgets.floating("##offer", look):
         widgets.to_front()
         edits, were = ("1 edit", "was") if offer.count == 1 else (f"{offer.count} edits", "were")
         imgui.text_colored(theme.ACCENT, fa.ICON_FA_CLOCK_ROTATE_LEFT)
@@ -131,8 +121,6 @@ def draw_edits_offer(state: State, look: Look, place: ImVec2, size: ImVec2) -> l
         widgets.beside(look.px(_ANSWER))
         if imgui.button("Forget them", look.vec(_ANSWER, 0)):
             issued.append(keep.EndOffer(forget=True))
-        imgui.end()
-    imgui.pop_style_var()
     return issued
 
 

@@ -118,17 +118,12 @@ def save(preferences: Preferences, path: Path | None = None, since: Preferences 
 
 def merged(own: Preferences, since: Preferences, theirs: Preferences) -> Preferences:
     """`theirs`, with what has become of `since` in `own`."""
-    changed = {name: value for name, value in values_of(own).items() if value != getattr(since, name)}
+    changed = {name: value for name, value in asdict(own).items() if value != getattr(since, name)}
     if own.recent and "recent" in changed:
         opened, gone = _opened(own.recent, since.recent), {*since.recent} - {*own.recent}
         others = (path for path in theirs.recent if path not in gone and path not in opened)
         changed["recent"] = (*opened, *others)[:MOST_RECENT]
     return replace(theirs, **changed)
-
-
-def values_of(preferences: Preferences) -> dict[str, Any]:
-    """By name."""
-    return {field.name: getattr(preferences, field.name) for field in fields(preferences)}
 
 
 def _opened(own: tuple[str, ...], since: tuple[str, ...]) -> tuple[str, ...]:

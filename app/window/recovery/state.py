@@ -1,6 +1,7 @@
-"""What is kept for the next time: a session that ended badly, edits that nobody saved."""
+"""What is kept for the next time: a window's record, edits that nobody saved."""
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from datetime import datetime
 from pathlib import Path
 
@@ -14,11 +15,13 @@ KeptPhoto = tuple[str, float | None]
 
 @dataclass(frozen=True)
 class Kept:
-    """What a session holds. scene: its file, or the copy kept of one that was never saved, then
-    `saved` is false. edits: the file of those that nobody saved. phrases: texts. likes: of each phrase
-    the language vector that it asks instead, float32 bytes in hexadecimal digits, or none. thresholds: of
-    each phrase the person's own. colours, visible: of each phrase. file: where this was read from.
-    missing: names of photos that were in the tray and are not on the disk any more."""
+    """What a window holds, and how its scene was left. scene: its file, or the copy kept of one that was
+    never saved, then `saved` is false. edits: the file of those that nobody saved. phrases: texts. likes: of
+    each phrase the language vector that it asks instead, float32 bytes in hexadecimal digits, or none.
+    thresholds: of each phrase the person's own. colours, visible: of each phrase. aside: photos of the scene,
+    where those in the tray are a new room's. views: photos that it is made of, 0 where nobody knows. file:
+    where this was read from. when: it was written. missing: names of photos that were in the tray and are
+    not on the disk any more."""
 
     photos: tuple[str, ...] = ()
     fovs: tuple[float | None, ...] = ()
@@ -33,7 +36,10 @@ class Kept:
     visible: tuple[bool, ...] = ()
     mode: str = "rgb"
     pose: Pose | None = None
+    aside: tuple[KeptPhoto, ...] | None = None
+    views: int = 0
     file: Path | None = None
+    when: datetime | None = None
     missing: tuple[str, ...] = ()
 
     @property
@@ -41,15 +47,39 @@ class Kept:
         """Whether nothing would be lost."""
         return not (self.photos or self.scene or any(self.phrases))
 
+    @property
+    def tray(self) -> tuple[KeptPhoto, ...]:
+        """The photos with their fields of view."""
+        return tuple(zip(self.photos, self.fovs, strict=True))
+
+    @property
+    def picture(self) -> str:
+        """What the small picture of the scene is called."""
+        return f"project {self.scene}"
+
+    def with_photos(self, photos: Sequence[KeptPhoto], missing: tuple[str, ...] = ()) -> "Kept":
+        """With others in the tray."""
+        paths, fovs = tuple(path for path, _ in photos), tuple(fov for _, fov in photos)
+        return replace(self, photos=paths, fovs=fovs, missing=missing)
+
+    def closed(self) -> "Kept":
+        """How the scene was left: with its own photos, and its edits are offered by themselves."""
+        kept = replace(self, edits="", aside=None, file=None)
+        return kept if self.aside is None else kept.with_photos(self.aside)
+
     def sentence(self) -> str:
-        """What it holds, for people."""
-        parts = [self.name or Path(self.scene).name] if self.scene else []
-        if self.photos:
-            parts.append(f"{len(self.photos)} photo{'s' * (len(self.photos) > 1)}")
-        phrases = [phrase for phrase in self.phrases if phrase.strip()]
-        if phrases:
-            parts.append(f"{len(phrases)} phrase{'s' * (len(phrases) > 1)}")
-        return ", ".join(parts)
+        """What a session holds, for people."""
+        named = self.name or Path(self.scene).name
+        return ", ".join([named] * bool(self.scene) + self._counted(len(self.photos)))
+
+    def project_sentence(self) -> str:
+        """What a scene holds, for people; nothing where it is not known."""
+        return ", ".join(self._counted(self.views))
+
+    def _counted(self, photos: int) -> list[str]:
+        phrases = sum(bool(phrase.strip()) for phrase in self.phrases)
+        counted = ((photos, "photo"), (phrases, "phrase"))
+        return [f"{count} {word}{'s' * (count > 1)}" for count, word in counted if count]
 
 
 @dataclass(frozen=True)
@@ -71,28 +101,6 @@ class Offer:
 
 
 @dataclass(frozen=True)
-class Project:
-    """A scene that was open lately, as it was left. path: of its file. views: photos that it is made of, 0
-    where nobody knows. when: it was open last; None where that is not known."""
-
-    path: str
-    kept: Kept = Kept()
-    views: int = 0
-    when: datetime | None = None
-
-    @property
-    def picture(self) -> str:
-        """What its small picture is called."""
-        return f"project {self.path}"
-
-    def sentence(self) -> str:
-        """What it holds, for people; nothing where it is not known."""
-        phrases = sum(bool(phrase.strip()) for phrase in self.kept.phrases)
-        counted = ((self.views, "photo"), (phrases, "phrase"))
-        return ", ".join(f"{count} {word}{'s' * (count > 1)}" for count, word in counted if count)
-
-
-@dataclass(frozen=True)
 class Recovery:
     """The recovery half of the state.
 
@@ -105,7 +113,7 @@ class Recovery:
     edits: Offer | None = None
     copy: Path | None = None
     kept: Path | None = None
-    projects: tuple[Project, ...] = ()
+    projects: tuple[Kept, ...] = ()
 
 
 NO_RECOVERY = Recovery()

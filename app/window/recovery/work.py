@@ -3,8 +3,7 @@
 Heavy imports wait until they are needed.
 """
 
-from collections.abc import Iterable, Iterator
-from contextlib import suppress
+from collections.abc import Callable, Iterable, Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -14,7 +13,7 @@ from langflash_core.scene.edits import History, Marks
 
 from ..commands import Command
 from ..requests import Asked, SceneTask, Task
-from . import edits, projects, sessions
+from . import edits, records
 from .commands import CopyKept, EditsKept, OfferEdits, ProjectsRead
 from .state import KeptPhoto
 
@@ -56,43 +55,13 @@ class KeepEdits(SceneTask):
 
 
 @dataclass(frozen=True)
-class ForgetEdits(Task):
-    """Remove what a session kept of a scene."""
+class Forget(Task):
+    """Remove what was kept."""
 
-    scene: "Scene" = field(repr=False)
-    token: str
-
-    def run(self, stopping: Asked) -> Iterable[Command]:
-        edits.forget(self.scene, self.token)
-        return ()
-
-
-@dataclass(frozen=True)
-class ForgetScene(Task):
-    """Remove all that any session kept of a scene, by its content or its paths; of this session its `copies`,
-    and of those that ended badly what they exported."""
-
-    scene: "Scene | None" = field(repr=False)
-    paths: tuple[Path, ...]
-    copies: tuple[Path, ...] = ()
+    remove: Callable[[], object]
 
     def run(self, stopping: Asked) -> Iterable[Command]:
-        edits.forget_scene(self.scene, self.paths)
-        for file in self.copies:
-            with suppress(OSError):
-                file.unlink(missing_ok=True)
-        sessions.forget_exported()
-        return ()
-
-
-@dataclass(frozen=True)
-class ForgetFile(Task):
-    """Remove a file of kept edits."""
-
-    edits: Path
-
-    def run(self, stopping: Asked) -> Iterable[Command]:
-        edits.forget_file(self.edits)
+        self.remove()
         return ()
 
 
@@ -118,4 +87,4 @@ class ReadProjects(Task):
     light = True
 
     def run(self, stopping: Asked) -> Iterator[Command]:
-        yield ProjectsRead(tuple(map(projects.read, projects.sweep(self.recent))))
+        yield ProjectsRead(tuple(map(records.project, records.sweep(self.recent))))

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from app.window.recovery import projects
+from app.window.recovery import tiles
 from langflash_core.scene.file import load, save
 from tests.app.cli.conftest import HEIGHT, WIDTH, stripes
 
@@ -51,17 +51,17 @@ def test_no_small_picture_of_recent_scenes_shows_it_any_more(
     done, photographed, tmp_path, monkeypatch: pytest.MonkeyPatch
 ):
     """It lay on the disk until the window was opened next."""
-    monkeypatch.setenv("LANGFLASH_CONFIG", str(tmp_path / "config"))
+    monkeypatch.setenv("LANGFLASH_STATE", str(tmp_path / "state"))
     monkeypatch.chdir(tmp_path)
     other, out = tmp_path / "other.langflash", tmp_path / "public.langflash"
     for path in (other, out):
         path.write_bytes(photographed.read_bytes())
     seen = np.full((60, 90, 3), 200, np.uint8)
     for path in (photographed, other, out):
-        projects.keep_picture(str(path), seen, projects.stamp(path))
+        tiles.keep_picture(str(path), seen, tiles.stamp(path))
     assert len(list(tmp_path.rglob("*.jpg"))) == 3
     done("hide", photographed.name, "armchair", "-o", out.name, "--backend", "torch")
-    assert len(list(tmp_path.rglob("*.jpg"))) == 1 and projects.picture(str(other)) is not None
+    assert len(list(tmp_path.rglob("*.jpg"))) == 1 and tiles.picture(str(other)) is not None
 
 
 @pytest.mark.parametrize(

@@ -118,3 +118,9 @@ def shown_scene(path: Path | None = Path("/rooms/my room.langflash")) -> State:
         history=History(first_marks(scene)),
     )  # fmt: skip
     return after(State(), SceneArrived(info), EditPrompt(0, "door"))
+
+
+def labels(state: State) -> list[str]:
+    """Of the edits that are done."""
+    assert state.editing.history is not None
+    return [entry.label for entry in state.editing.history.done]

@@ -20,14 +20,25 @@ pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="asks the GNU C 
 FREE_MB = 12  # that a window at rest holds and needs not
 HELD_MB = 100  # of the 300 MB of arrays that are gone; what lies apart leaves a tenth of that
 
+RESIDENT = """
+def resident_mb():
+    lines = open("/proc/self/status").read().splitlines()
+    return next(int(line.split()[1]) for line in lines if line.startswith("RssAnon:")) / 1024
+"""
+
+
+def told_mb(program: str, *words: str | Path, **more) -> list[float]:
+    """What a process of its own prints, MB: what other tests have left free would feed it."""
+    command = [sys.executable, "-c", RESIDENT + program, *map(str, words)]
+    done = subprocess.run(command, **{"cwd": ROOT, "capture_output": True, "text": True, **more})
+    assert done.returncode == 0, done.stderr
+    return [float(word) for word in done.stdout.split()]
+
+
 ARRAYS_AMONG_SMALL_THINGS = """
 import sys
 import numpy as np
 from langflash_core.base import memory
-
-def resident_mb():
-    lines = open("/proc/self/status").read().splitlines()
-    return next(int(line.split()[1]) for line in lines if line.startswith("RssAnon:")) / 1024
 
 if sys.argv[1] == "apart":
     memory.keep_tidy()
@@ -45,18 +56,11 @@ print(resident_mb() - before)
 """
 
 
-def held_mb(how: str) -> tuple[float, float]:
-    """MB that stay of arrays which are gone, at once and once they were given back."""
-    program = [sys.executable, "-c", ARRAYS_AMONG_SMALL_THINGS, how]
-    done = subprocess.run(program, cwd=ROOT, capture_output=True, text=True, check=True)
-    at_once, later = map(float, done.stdout.split())
-    return at_once, later
-
-
 def test_large_arrays_leave_nothing_behind() -> None:
-    at_once, _ = held_mb("apart")
+    """At once, and once they were given back."""
+    at_once, _ = told_mb(ARRAYS_AMONG_SMALL_THINGS, "apart")
     assert at_once < HELD_MB
-    usual, later = held_mb("as usual")
+    usual, later = told_mb(ARRAYS_AMONG_SMALL_THINGS, "as usual")
     assert usual > 2 * HELD_MB  # what the library does by itself, else this test could not fail
     assert later < HELD_MB  # what `give_back` is for
 
@@ -65,10 +69,6 @@ THREADS_BY_TURNS = """
 import sys
 from threading import Event, Thread
 from langflash_core.base import memory
-
-def resident_mb():
-    lines = open("/proc/self/status").read().splitlines()
-    return next(int(line.split()[1]) for line in lines if line.startswith("RssAnon:")) / 1024
 
 if sys.argv[1] == "tidy":
     memory.keep_tidy()
@@ -94,13 +94,9 @@ print(resident_mb() - before)
 
 def test_what_one_thread_gives_back_serves_the_next() -> None:
     """Eight threads take 39 MB each, one after the other, and keep a hundredth."""
-
-    def gained(how: str) -> float:
-        program = [sys.executable, "-c", THREADS_BY_TURNS, how]
-        return float(subprocess.run(program, cwd=ROOT, capture_output=True, text=True, check=True).stdout)
-
-    assert gained("tidy") < 2 * 39  # once, and the pieces that stay
-    assert gained("as usual") > 4 * 39  # what the library does by itself, else this test could not fail
+    (tidy,), (usual,) = (told_mb(THREADS_BY_TURNS, how) for how in ("tidy", "as usual"))
+    assert tidy < 2 * 39  # once, and the pieces that stay
+    assert usual > 4 * 39  # what the library does by itself, else this test could not fail
 
 
 A_JOB_OF_CRUMBS = """
@@ -109,10 +105,6 @@ from app.window.commands import Notify
 from app.window.requests import Job
 from app.window.scene.commands import Loaded
 from app.window.worker import Worker
-
-def resident_mb():
-    lines = open("/proc/self/status").read().splitlines()
-    return next(int(line.split()[1]) for line in lines if line.startswith("RssAnon:")) / 1024
 
 class Crumbs(Job):
     # takes 200 MB in pieces too small to be mapped one by one, and keeps every hundredth
@@ -146,11 +138,7 @@ worker.stop()
 
 
 def test_what_a_finished_job_held_goes_back() -> None:
-    """In a process of its own: what other tests have left free would feed the job."""
-    program = [sys.executable, "-c", A_JOB_OF_CRUMBS]
-    done = subprocess.run(program, cwd=ROOT, capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
-    taken, stayed = map(float, done.stdout.split())
+    taken, stayed = told_mb(A_JOB_OF_CRUMBS)
     assert taken > 150  # of 200 MB
     assert stayed < 60  # a third of it; allocators round
 
@@ -184,10 +172,6 @@ def until(reached, seconds=240):
         assert time.monotonic() < end, session.state
         session.step(0.1)
 
-def resident_mb():
-    lines = open("/proc/self/status").read().splitlines()
-    return next(int(line.split()[1]) for line in lines if line.startswith("RssAnon:")) / 1024
-
 def asked(text):
     session.dispatch(EditPrompt(session.state.asking.prompts[0].key, text))
     until(lambda: session.state.asking.prompts[0].text == text)
@@ -217,7 +201,4 @@ def test_a_window_at_rest_holds_little_that_is_free(tmp_path: Path) -> None:
     with x_server(1000, 700) as display:
         own = {**environment(tmp_path, ROOT), "DISPLAY": display}
         own.pop("WAYLAND_DISPLAY", None)
-        program = [sys.executable, "-c", ASKING, str(scene)]
-        done = subprocess.run(program, cwd=tmp_path, env=own, capture_output=True, text=True)
-    assert done.returncode == 0, done.stderr
-    assert float(done.stdout.split()[-1]) < FREE_MB
+        assert told_mb(ASKING, scene, cwd=tmp_path, env=own)[-1] < FREE_MB

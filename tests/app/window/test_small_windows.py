@@ -21,7 +21,7 @@ from app.window.kit import theme, widgets
 from app.window.kit.boxes import bars, overlap, window_box
 from app.window.kit.look import Look
 from app.window.recovery import commands as keep
-from app.window.recovery.state import Offer, Project
+from app.window.recovery.state import Kept, Offer
 from app.window.scene.panels.legend import covers_views
 from app.window.state import State
 from app.window.touring import commands as tour
@@ -134,12 +134,12 @@ def test_small_tools_show_their_whole_icons(monkeypatch) -> None:
     """Each was half as wide as its button's padding left."""
     seen: list[tuple[float, float]] = []
 
-    def button(icon: str, chosen: bool, side: ImVec2, tip: str) -> bool:
+    def button(icon: str, on: bool, tip: str, side: ImVec2) -> bool:
         padding = imgui.get_style().frame_padding.x
         seen.append((imgui.calc_text_size(icon).x + 2 * padding, side.x))
         return False
 
-    monkeypatch.setattr(tools, "_tool_button", button)
+    monkeypatch.setattr(tools.widgets, "toggle", button)
     with context((800, 500)):
         theme.set_up(1.0, "dark")
         frames(lambda at: tools.draw(shown_scene(), at, ImVec2(348, 52), ImVec2(452, 416)), look())
@@ -212,7 +212,7 @@ def test_in_the_empty_window_kept_edits_are_offered_above_what_can_be_opened(
     monkeypatch, items: Items
 ) -> None:
     """It stood before the tile of the very scene that it is about."""
-    project = Project("/rooms/living_room_left.langflash", when=datetime(2026, 11, 25))
+    project = Kept(scene="/rooms/living_room_left.langflash", when=datetime(2026, 11, 25))
     state = State().with_recovery(projects=(project,))
     with context((800, 500)):
         theme.set_up(1.0, "dark")

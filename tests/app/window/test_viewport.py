@@ -419,8 +419,7 @@ def test_what_a_phrase_does_not_mean_leaves_the_picture_and_no_splat_is_drawn(vi
             if whole and view is not None and tuple(view.frame.alphas.shape) == SIZE[::-1]:
                 break
         assert view is not None
-        parts = (view.relevance, view.frame, view.camera, view.query, view.revision)
-        done = Answer(1, view.keys, *parts, view.others, view.up, view.cuts, view.name).run(lambda: False)
+        done = Answer(1, view).run(lambda: False)
         told = [each for each in done if isinstance(each, Narrowed | Answered)]
         narrowed = next((each for each in told if isinstance(each, Narrowed)), None)
         if narrowed is not None:

@@ -11,6 +11,7 @@ from PIL import Image
 from app.window.asking import commands as ask
 from app.window.asking.work import Answer, Encode
 from app.window.commands import Command, OfScene, ShowPicture
+from app.window.drawing.values import View
 from app.window.requests import Job, Task
 from app.window.scene import commands as show
 from app.window.scene import work
@@ -106,7 +107,8 @@ def test_a_scene_is_loaded_and_phrases_are_scored(worker: Worker, scene_file: Pa
     frame = render(info.scene, camera)
     assert frame.weight_maps is not None
     relevance = relevance_maps(frame.weight_maps, phrases.query)
-    worker.submit(Answer(info.serial, (4, 9), relevance, frame, camera, phrases.query))
+    view = View(info.serial, (4, 9), frame, relevance, camera, phrases.query, 0)
+    worker.submit(Answer(info.serial, view))
     scored = wait_for(worker, ask.Answered)  # and histograms, perhaps in the same moment
     scores = next(each for each in scored if isinstance(each, ask.Answered)).scores
     chair, elephant = answer(relevance, frame, camera, phrases.query).answers

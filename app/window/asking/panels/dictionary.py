@@ -144,7 +144,7 @@ def _row(state: State, k: int, atoms: tuple[Atom, ...], share: float, look: Look
     start, room = imgui.get_cursor_pos_x(), imgui.get_content_region_avail().x - look.px(6)
     issued += _name(state, k, atoms[k], room, look)
     figure = f"{100 * share:.1f} %"
-    _column(start + room - imgui.calc_text_size(figure).x)
+    widgets.column(start + room - imgui.calc_text_size(figure).x)
     imgui.align_text_to_frame_padding()
     imgui.text_colored(theme.MUTED, figure)
     issued += _words(state, k, atoms, start, room, look)
@@ -179,23 +179,17 @@ def _words(
     imgui.align_text_to_frame_padding()
     left = room - buttons - look.px(4) - imgui.calc_text_size(tail).x
     imgui.text_colored(theme.MUTED, widgets.shortened(words, left) + tail)
-    _column(start + room - buttons)
+    widgets.column(start + room - buttons)
     voice = fa.ICON_FA_VOLUME_HIGH if atom.on else fa.ICON_FA_VOLUME_XMARK
     tip = "It answers phrases; click to mute it" if atom.on else "Muted; click to let it answer phrases"
     if widgets.quiet_button(f"{voice}##voice", tip):
         issued.append(edit.ToggleAtom(k))
-    _column(start + room - side)
+    widgets.column(start + room - side)
     ticked, chosen = widgets.checkbox("##chosen", k in state.asking.chosen)
     widgets.tooltip("Tick to merge")
     if ticked:
         issued.append(ask.ChooseAtom(k, chosen))
     return issued
-
-
-def _column(x: float) -> None:
-    """Go on in the same line at `x` of the window, as the cursor counts it."""
-    imgui.same_line()
-    imgui.set_cursor_pos_x(x)
 
 
 def _picture(state: State, k: int, look: Look) -> list[do.Command]:

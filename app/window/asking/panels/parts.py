@@ -33,9 +33,7 @@ def draw(state: State, look: Look) -> list[do.Command]:
     widgets.gap(look.px(2))
     parts = f"{len(listed)} part{'s' * (len(listed) != 1)}" if listed else "Parts"
     count = parts + (f", {len(out)} removed" if out else "")
-    shape = imgui.TreeNodeFlags_.no_tree_push_on_open | imgui.TreeNodeFlags_.span_avail_width
-    with widgets.colours(text=theme.MUTED):
-        opened = imgui.tree_node_ex(f"{count}###parts", shape | imgui.TreeNodeFlags_.default_open)
+    opened = widgets.section(f"{count}###parts")
     widgets.tooltip("The parts of this answer. Ctrl+click one in the picture to remove it or bring it back")
     if not opened:
         return []
@@ -68,8 +66,7 @@ def _row(text: str, number: int, part: Part, busy: bool, look: Look) -> list[do.
     widgets.tooltip(
         f"Looks like: {part.kind or 'nothing it knows'}; {part.share:.1%} of the photo that shows it best"
     )
-    imgui.same_line()
-    imgui.set_cursor_pos_x(start + room - figures)
+    widgets.column(start + room - figures)
     corner, canvas, high = imgui.get_cursor_screen_pos(), imgui.get_window_draw_list(), look.px(5)
     low = ImVec2(corner.x, corner.y + (side - high) / 2)
     full = ImVec2(low.x + look.px(_BAR), low.y + high)
@@ -80,11 +77,9 @@ def _row(text: str, number: int, part: Part, busy: bool, look: Look) -> list[do.
     imgui.dummy(ImVec2(look.px(_BAR), side))
     widgets.tooltip(f"How likely this is {text}")
     figure = f"{part.sure:.0%}"
-    imgui.same_line()
-    imgui.set_cursor_pos_x(start + room - side - look.px(4) - imgui.calc_text_size(figure).x)
+    widgets.column(start + room - side - look.px(4) - imgui.calc_text_size(figure).x)
     imgui.text_colored(theme.MUTED, figure)
-    imgui.same_line()
-    imgui.set_cursor_pos_x(start + room - side)
+    widgets.column(start + room - side)
     imgui.begin_disabled(busy)
     pressed = widgets.quiet_button(f"{fa.ICON_FA_XMARK}##out", "Remove it from the answer  (Ctrl+Z undoes)")
     imgui.end_disabled()
@@ -97,8 +92,7 @@ def _out(state: State, text: str, k: int) -> list[do.Command]:
     side = imgui.get_frame_height()
     imgui.align_text_to_frame_padding()
     imgui.text_colored(theme.MUTED, widgets.shortened(f"removed: {state.editing.atom_name(k)}", room - side))
-    imgui.same_line()
-    imgui.set_cursor_pos_x(start + room - side)
+    widgets.column(start + room - side)
     pressed = widgets.quiet_button(f"{fa.ICON_FA_ROTATE_LEFT}##back", "Put it back into the answer")
     return [parting.TakePartBack(text, k)] if pressed else []
 

@@ -109,9 +109,7 @@ def _row_buttons(state: State, prompt: Prompt, look: Look) -> list[do.Command]:
     imgui.same_line(0, look.px(2))
     tip = "Select what this phrase found; Shift adds, Ctrl removes"
     if widgets.quiet_button(f"{fa.ICON_FA_DRAW_POLYGON}##select", tip) and prompt.text.strip():
-        io = imgui.get_io()
-        combine = "add" if io.key_shift else "remove" if io.key_ctrl else state.editing.combine
-        issued.append(edit.SelectByPhrase(prompt.key, combine))
+        issued.append(edit.SelectByPhrase(prompt.key, widgets.combined(state.editing.combine)))
     imgui.same_line(0, look.px(2))
     if widgets.quiet_button(f"{fa.ICON_FA_XMARK}##remove", "Remove"):
         issued.append(ask.RemovePrompt(prompt.key))
@@ -176,11 +174,8 @@ def _reading(prompt: Prompt, look: Look) -> list[do.Command]:
 
 def _negatives(state: State) -> list[do.Command]:
     issued: list[do.Command] = []
-    shape = imgui.TreeNodeFlags_.no_tree_push_on_open | imgui.TreeNodeFlags_.span_avail_width
-    with widgets.colours(text=theme.MUTED):
-        opened = imgui.tree_node_ex("Compared with", shape)
-    if not opened:
-        return issued
+    if not widgets.section("Compared with", opened=False):
+        return []
     widgets.muted("A phrase is found where it fits better than all of these (separated by commas).")
     imgui.set_next_item_width(-1)
     changed, text = imgui.input_text("##negatives", ", ".join(state.asking.negatives or state.asking.usual))

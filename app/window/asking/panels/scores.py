@@ -26,12 +26,9 @@ def draw(state: State, look: Look) -> list[do.Command]:
     if prompt is None or found is None:
         return []
     widgets.gap(look.px(2))
-    shape = imgui.TreeNodeFlags_.no_tree_push_on_open | imgui.TreeNodeFlags_.span_avail_width
-    with widgets.colours(text=theme.MUTED):
-        room = imgui.get_content_region_avail().x - look.px(30)
-        title = widgets.shortened(f"Scores of {prompt.text.strip()}", room)
-        opened = imgui.tree_node_ex(f"{title}###scores", shape | imgui.TreeNodeFlags_.default_open)
-    if not opened:
+    room = imgui.get_content_region_avail().x - look.px(30)
+    title = widgets.shortened(f"Scores of {prompt.text.strip()}", room)
+    if not widgets.section(f"{title}###scores"):
         return []
     known = None if state.scene.info is None else reliability(state.scene.info.scene.record.calibration)
     issued = _plot(prompt, np.array(found.counts, float), known, look)

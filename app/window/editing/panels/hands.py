@@ -4,8 +4,6 @@ import math
 
 from imgui_bundle import ImVec2, imgui
 
-from langflash_core.scene import edits
-
 from ... import commands as do
 from ...kit import widgets
 from ...kit.look import Look
@@ -36,13 +34,8 @@ def ask(look: Look, corner: ImVec2) -> list[point.Ask]:
 
 def pick(state: State, look: Look, corner: ImVec2) -> list[do.Command]:
     """A click without a drag selects the thing that is there."""
-    combine = _combined(state)
+    combine = widgets.combined(state.editing.combine)
     return [edit.SelectThing(each.at, combine) for each in ask(look, corner)]
-
-
-def _combined(state: State) -> edits.Combine:
-    io = imgui.get_io()
-    return "add" if io.key_shift else "remove" if io.key_ctrl else state.editing.combine
 
 
 def region(state: State, look: Look, corner: ImVec2) -> list[do.Command]:
@@ -59,7 +52,7 @@ def region(state: State, look: Look, corner: ImVec2) -> list[do.Command]:
     path = _path(editing.tool, editing.drag, start, here)
     if held:
         return [] if path == editing.drag else [point.Drag(path)]
-    combine = _combined(state)
+    combine = widgets.combined(state.editing.combine)
     clicked = math.hypot(way.x, way.y) < look.px(CLICK)
     unit = look.scale * pixels.x
     match editing.tool:

@@ -30,10 +30,9 @@ def draw(state: State, look: Look, right: float) -> list[do.Command]:
     editing, info = state.editing, state.scene.info
     imgui.push_style_var(imgui.StyleVar_.item_spacing, look.vec(4, 4))
     for handle, icon, tip in _HANDLES:
-        chosen, label = editing.handle is handle, f"{icon}##{handle.name}"
-        if widgets.primary_button(label) if chosen else imgui.button(label):
+        tip = f"{tip}\nCtrl snaps, Ctrl+arrows move in steps"
+        if widgets.toggle(f"{icon}##{handle.name}", editing.handle is handle, tip):
             issued.append(placing.SetHandle(handle))
-        widgets.tooltip(f"{tip}\nCtrl snaps, Ctrl+arrows move in steps")
         imgui.same_line()
     imgui.pop_style_var()
     if editing.marks is None or info is None or not editing.marks.selected:
@@ -73,10 +72,10 @@ def _fields(state: State, pivot: placing.Spot, look: Look, right: float) -> list
     return [placing.Adjust(wanted)] if isinstance(wanted, Moved) else []
 
 
-def draw_tint(state: State, tint: Tint, look: Look, right: float) -> list[do.Command]:
+def draw_tint(state: State, look: Look, right: float) -> list[do.Command]:
     """Colour and strength, as the picture shows them; made or taken away. right: where a line ends."""
-    editing, info = state.editing, state.scene.info
-    if editing.marks is None or info is None:
+    editing, info, tint = state.editing, state.scene.info, state.editing.tint
+    if editing.marks is None or info is None or tint is None:
         return []
     imgui.align_text_to_frame_padding()
     imgui.text_colored(theme.MUTED, fa.ICON_FA_PALETTE)

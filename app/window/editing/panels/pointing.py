@@ -30,17 +30,17 @@ def draw_marks(state: State, look: Look, place: ImVec2, size: ImVec2) -> None:
     that was asked about."""
     _outline(state, look, place)
     _region(state, look, place, size)
-    editing = state.editing
+    editing, pinned = state.editing, list[Reading]()
     if editing.tool is Tool.CLONE and editing.source is not None:
-        at = _pinned_at(state, Reading((0.0, 0.0), editing.source), place, size)
-        if at is not None:
-            _pin(at, look)
+        pinned.append(Reading((0.0, 0.0), editing.source))
     if editing.card is not None:
-        at = _pinned_at(state, editing.card.reading, place, size)
+        pinned.append(editing.card.reading)
+    elif editing.asked is not None:
+        pinned.append(Reading(editing.asked))
+    for reading in pinned:
+        at = _pinned_at(state, reading, place, size)
         if at is not None:
             _pin(at, look)
-    elif editing.asked is not None:
-        _pin(_on_screen(editing.asked, place), look)
 
 
 def draw(state: State, look: Look, place: ImVec2, size: ImVec2) -> list[do.Command]:
@@ -80,10 +80,9 @@ def _region(state: State, look: Look, place: ImVec2, size: ImVec2) -> None:
     editing = state.editing
     if not editing.draws:
         return
-    io, canvas = imgui.get_io(), imgui.get_window_draw_list()
+    canvas = imgui.get_window_draw_list()
     canvas.push_clip_rect(place, ImVec2(place.x + size.x, place.y + size.y), True)
-    combine = "add" if io.key_shift else "remove" if io.key_ctrl else editing.combine
-    combine = combine if editing.tool.selects else "replace"
+    combine = widgets.combined(editing.combine) if editing.tool.selects else "replace"
     colour = theme.BAD if combine == "remove" else theme.SELECTED
     line, fill = widgets.u32(colour), widgets.u32(ImVec4(colour.x, colour.y, colour.z, 0.22))
     path = [_on_screen(at, place) for at in editing.drag]
@@ -194,15 +193,10 @@ def _card(state: State, card: Card, look: Look, place: ImVec2, size: ImVec2) -> 
         corner = ImVec2(x, max(y, place.y + look.px(12)))
     imgui.set_next_window_pos(corner)
     imgui.set_next_window_size(ImVec2(look.px(_CARD), 0))
-    imgui.push_style_var(imgui.StyleVar_.window_rounding, look.px(8))
-    with widgets.colours(window_bg=imgui.get_style().color_(imgui.Col_.popup_bg)):
-        imgui.begin("##card", None, widgets.PLAIN | imgui.WindowFlags_.no_focus_on_appearing)
+    with widgets.floating("##card", look):
         if imgui.is_window_appearing():  # over the dictionary, and without its keys
             imgui.internal.bring_window_to_display_front(imgui.internal.get_current_window())
-        issued = _answer(state, card, look)
-        imgui.end()
-    imgui.pop_style_var()
-    return issued
+        return _answer(state, card, look)
 
 
 def _answer(state: State, card: Card, look: Look) -> list[do.Command]:
@@ -271,7 +265,7 @@ def _group(state: State, card: Card, k: int, look: Look) -> list[do.Command]:
     issued: list[do.Command] = []
     marks = state.editing.marks
     if marks is None or k >= len(marks.atoms):
-        return issued
+        return []
     atom = marks.atoms[k]
     imgui.separator()
     imgui.push_id(k)

@@ -20,7 +20,6 @@ from .. import pointing as point
 from ..state import Tool
 
 _ENTER = imgui.InputTextFlags_.enter_returns_true | imgui.InputTextFlags_.auto_select_all
-_BAR = widgets.PLAIN | imgui.WindowFlags_.always_auto_resize | imgui.WindowFlags_.no_focus_on_appearing
 
 
 def draw(state: State, look: Look, place: ImVec2, size: ImVec2) -> list[do.Command]:
@@ -52,10 +51,7 @@ def _field(state: State, look: Look, ends: list[ImVec2]) -> list[do.Command]:
     length = point.measured(state.editing.ruler) or 0.0
     middle = ImVec2((ends[0].x + ends[1].x) / 2, (ends[0].y + ends[1].y) / 2 + look.px(12))
     imgui.set_next_window_pos(middle, 0, ImVec2(0.5, 0))
-    imgui.push_style_var(imgui.StyleVar_.window_rounding, look.px(8))
-    imgui.push_style_var(imgui.StyleVar_.window_padding, look.vec(10, 7))
-    with widgets.colours(window_bg=imgui.get_style().color_(imgui.Col_.popup_bg)):
-        imgui.begin("##ruler", None, _BAR)
+    with widgets.floating("##ruler", look, (10, 7), imgui.WindowFlags_.always_auto_resize):
         imgui.align_text_to_frame_padding()
         imgui.text(said(length, state.metric, state.guess))
         if state.guess is not None:
@@ -78,6 +74,4 @@ def _field(state: State, look: Look, ends: list[ImVec2]) -> list[do.Command]:
         ):
             start, end = (Vector(*spot) for spot in state.editing.ruler)
             issued += [tour.AddNote("Measure", start, end), point.ClearRuler()]
-        imgui.end()
-    imgui.pop_style_var(2)
     return issued

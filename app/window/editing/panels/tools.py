@@ -1,5 +1,7 @@
 """On the picture's left: the tools; beside them what the tool in hand and the selection can do."""
 
+from functools import partial
+
 from imgui_bundle import ImVec2, imgui
 from imgui_bundle import icons_fontawesome_6 as fa
 
@@ -15,7 +17,7 @@ from .. import cleaning as clean
 from .. import commands as edit
 from .. import mending, placing, things
 from .. import pointing as point
-from ..state import RADIUS_RANGE, REACH_RANGE, THINGS, Editing, Floaters, Hiding, Reached, Tool
+from ..state import RADIUS_RANGE, REACH_RANGE, THINGS, Editing, Hiding, Reached, Tool
 from . import placing as placing_bar
 
 _TOOLS = (
@@ -57,42 +59,30 @@ _LEVELS = 130.0  # of that of how much of a thing is selected
 _GROWING = _REACH + 130.0  # and of the buttons before it
 _MARGIN_SLIDER = 116.0  # of how much around a part is hidden with it
 _PADDING = 10.0  # of a bar, left and right
-_BAR = (
-    widgets.PLAIN | imgui.WindowFlags_.always_auto_resize | imgui.WindowFlags_.no_focus_on_appearing
-)  # a small window over the picture
 
 
 def draw(state: State, look: Look, place: ImVec2, size: ImVec2) -> list[do.Command]:
     """Strip and bars over the picture at `place`. Bars go on in a further line where one is too short."""
     corner = ImVec2(place.x + look.px(_MARGIN), place.y + look.px(_MARGIN))
     side = tool_side(size.y / look.scale)
-    issued, _ = _panel("##tools", corner, look, lambda: _strip(state, look, side), tight=True)
+    issued, _ = _panel("##tools", corner, look, lambda: _strip(state, look, side), (6, 6))
     corner = ImVec2(corner.x + look.px(_BUTTON + 22), corner.y)
     end = _beside_dictionary(corner.x, place.x + size.x - look.px(_MARGIN), corner.y)
     right = end - look.px(_PADDING)
-    bars = []
-    if state.editing.tool.selects:
-        bars.append(lambda: _options(state, look, right))
-    if state.editing.tool is Tool.CLONE:
-        bars.append(lambda: _cloning(state, look, right))
-    if state.editing.tool is Tool.PLACE:
-        bars.append(lambda: placing_bar.draw(state, look, right))
-    if state.editing.num_selected or state.editing.waiting:
-        bars.append(lambda: _selection(state, look, right))
-    if state.editing.tint is not None:
-        tint = state.editing.tint
-        bars.append(lambda: placing_bar.draw_tint(state, tint, look, right))
-    if state.editing.hiding is not None and state.editing.num_selected:
-        hiding = state.editing.hiding
-        bars.append(lambda: _hiding(state, hiding, look, right))
-    if state.editing.floaters is not None:
-        found = state.editing.floaters
-        bars.append(lambda: _floaters(state, found, look, right))
-    hidden = state.editing.marks is not None and bool(state.editing.marks.hidden)
-    if hidden and not state.editing.num_selected:
-        bars.append(lambda: _hidden(state))
-    for number, bar in enumerate(bars):
-        wanted, height = _panel(f"##bar{number}", corner, look, bar)
+    editing, selected = state.editing, state.editing.num_selected > 0
+    hidden = editing.marks is not None and bool(editing.marks.hidden)
+    bars = (
+        (editing.tool.selects, _options),
+        (editing.tool is Tool.CLONE, _cloning),
+        (editing.tool is Tool.PLACE, placing_bar.draw),
+        (selected or editing.waiting, _selection),
+        (editing.tint is not None, placing_bar.draw_tint),
+        (editing.hiding is not None and selected, _hiding),
+        (editing.floaters is not None, _floaters),
+        (hidden and not selected, _hidden),
+    )
+    for number, bar in enumerate(bar for stands, bar in bars if stands):
+        wanted, height = _panel(f"##bar{number}", corner, look, partial(bar, state, look, right))
         issued += wanted
         corner = ImVec2(corner.x, corner.y + height + look.px(8))
     return issued
@@ -117,18 +107,12 @@ def tool_side(height: float) -> float:
 
 
 def _panel(
-    name: str, corner: ImVec2, look: Look, body, tight: bool = False
+    name: str, corner: ImVec2, look: Look, body, padding: tuple[float, float] = (_PADDING, 7)
 ) -> tuple[list[do.Command], float]:
     """A rounded window that holds what `body` draws; also its height."""
     imgui.set_next_window_pos(corner)
-    imgui.push_style_var(imgui.StyleVar_.window_rounding, look.px(8))
-    imgui.push_style_var(imgui.StyleVar_.window_padding, look.vec(6, 6) if tight else look.vec(_PADDING, 7))
-    with widgets.colours(window_bg=imgui.get_style().color_(imgui.Col_.popup_bg)):
-        imgui.begin(name, None, _BAR)
-        issued, height = body(), imgui.get_window_height()
-        imgui.end()
-    imgui.pop_style_var(2)
-    return issued, height
+    with widgets.floating(name, look, padding, imgui.WindowFlags_.always_auto_resize):
+        return body(), imgui.get_window_height()
 
 
 def _strip(state: State, look: Look, wide: float) -> list[do.Command]:
@@ -138,45 +122,40 @@ def _strip(state: State, look: Look, wide: float) -> list[do.Command]:
     imgui.push_style_var(imgui.StyleVar_.item_spacing, look.vec(_GAP, _GAP))
     imgui.push_style_var(imgui.StyleVar_.frame_padding, ImVec2(0, 0))  # small buttons hold their icons, too
     for tool, icon, tip in _TOOLS:
-        if _tool_button(icon, editing.tool is tool, side, tip):
+        if widgets.toggle(icon, editing.tool is tool, tip, side):
             taken = tool is Tool.PLACE
             issued.append(placing.SetHandle(editing.handle) if taken else point.SetTool(tool))
     imgui.separator()
-    if _tool_button(
-        fa.ICON_FA_WAND_MAGIC_SPARKLES,
-        editing.floaters is not None,
-        side,
-        "Remove floaters and stray bits, with a preview; within the selection, if there is one",
-    ):
+    tip = "Remove floaters and stray bits, with a preview; within the selection, if there is one"
+    if widgets.toggle(fa.ICON_FA_WAND_MAGIC_SPARKLES, editing.floaters is not None, tip, side):
         issued.append(edit.FindFloaters() if editing.floaters is None else edit.EndFloaters())
     imgui.separator()
     history = editing.history
     last = history.done[-1].label if history and history.done else ""
-    bring_back = not last and state.scene.unhidden is not None
-    forget = not last and state.scene.mute is not None
-    last = "what was hidden" if bring_back else "answering phrases" if forget else last
+    back: do.Command = edit.Undo()
+    if not last and state.scene.unhidden is not None:
+        last, back = "what was hidden", mending.BringBack()
+    elif not last and state.scene.mute is not None:
+        last, back = "answering phrases", lifting.ForgetPhrases()
     following = history.undone[-1].label if history and history.undone else ""
-    imgui.begin_disabled(not last)
-    if _tool_button(
-        fa.ICON_FA_ROTATE_LEFT, False, side, f"Undo: {last}  (Ctrl+Z)" if last else "Undo  (Ctrl+Z)"
+    for icon, verb, label, keys, command in (
+        (fa.ICON_FA_ROTATE_LEFT, "Undo", last, "Ctrl+Z", back),
+        (fa.ICON_FA_ROTATE_RIGHT, "Redo", following, "Ctrl+Shift+Z", edit.Redo()),
     ):
-        issued.append(
-            mending.BringBack() if bring_back else lifting.ForgetPhrases() if forget else edit.Undo()
-        )
-    imgui.end_disabled()
-    imgui.begin_disabled(not following)
-    tip = f"Redo: {following}  (Ctrl+Shift+Z)" if following else "Redo  (Ctrl+Shift+Z)"
-    if _tool_button(fa.ICON_FA_ROTATE_RIGHT, False, side, tip):
-        issued.append(edit.Redo())
-    imgui.end_disabled()
+        imgui.begin_disabled(not label)
+        if widgets.toggle(icon, False, f"{verb}: {label}  ({keys})" if label else f"{verb}  ({keys})", side):
+            issued.append(command)
+        imgui.end_disabled()
     imgui.pop_style_var(2)
     return issued
 
 
-def _tool_button(icon: str, chosen: bool, side: ImVec2, tip: str) -> bool:
-    pressed = widgets.primary_button(icon, side) if chosen else imgui.button(icon, side)
-    widgets.tooltip(tip)
-    return pressed
+def _button(
+    label: str, tip: str, command: do.Command, right: float, gap: float = -1.0, on: bool = False
+) -> list[do.Command]:
+    """In a bar, beside what is there, or below where that ends at `right`; what it does once pressed."""
+    widgets.go_on(widgets.button_width(label), right, gap)
+    return [command] if widgets.toggle(label, on, tip) else []
 
 
 def _options(state: State, look: Look, right: float) -> list[do.Command]:
@@ -185,28 +164,37 @@ def _options(state: State, look: Look, right: float) -> list[do.Command]:
     editing = state.editing
     imgui.push_style_var(imgui.StyleVar_.item_spacing, look.vec(4, 4))
     for combine, icon, tip in _COMBINES:
-        chosen = editing.combine == combine
-        if widgets.primary_button(f"{icon}##{combine}") if chosen else imgui.button(f"{icon}##{combine}"):
+        if widgets.toggle(f"{icon}##{combine}", editing.combine == combine, tip):
             issued.append(point.SetCombine(combine))
-        widgets.tooltip(tip)
         imgui.same_line()
     imgui.pop_style_var()
-    label = f"{fa.ICON_FA_LAYER_GROUP}  Through"
-    widgets.go_on(widgets.button_width(label), right, look.px(14))
-    if widgets.primary_button(label) if editing.through else imgui.button(label):
-        issued.append(point.SetThrough(not editing.through))
-    widgets.tooltip("Also select what is hidden behind other things")
-    if editing.tool is Tool.BRUSH:
-        issued += _radius(state, look, right)
-    return issued
+    label, tip = f"{fa.ICON_FA_LAYER_GROUP}  Through", "Also select what is hidden behind other things"
+    through = point.SetThrough(not editing.through)
+    issued += _button(label, tip, through, right, look.px(14), editing.through)
+    return issued + (_radius(state, look, right) if editing.tool is Tool.BRUSH else [])
+
+
+def _slider(
+    label: str,
+    value: float,
+    limits: tuple[float, float],
+    text: str,
+    tip: str,
+    width: float,
+    right: float,
+    look: Look,
+) -> tuple[bool, float]:
+    """As `widgets.slider`, in a bar, or below where that ends at `right`. width: design pixels."""
+    widgets.go_on(widgets.named(label, look.px(width)), right, look.px(14))
+    return widgets.slider(label, value, limits, text, tip, look.px(width))
 
 
 def _radius(state: State, look: Look, right: float) -> list[do.Command]:
     """How large the brush is."""
-    label, tip, width = "Radius##radius", "Radius of the brush, pixels  ([ and ])", look.px(150)
-    widgets.go_on(widgets.named(label, width), right, look.px(14))
-    text = f"{state.editing.radius:.0f} px"
-    changed, radius = widgets.slider(label, state.editing.radius, RADIUS_RANGE, text, tip, width)
+    radius, tip = state.editing.radius, "Radius of the brush, pixels  ([ and ])"
+    changed, radius = _slider(
+        "Radius##radius", radius, RADIUS_RANGE, f"{radius:.0f} px", tip, 150, right, look
+    )
     return [point.SetRadius(radius)] if changed else []
 
 
@@ -218,16 +206,11 @@ def _cloning(state: State, look: Look, right: float) -> list[do.Command]:
         imgui.text("Click what to copy")
         return []
     imgui.text("Paint where to put it")
-    issued: list[do.Command] = []
-    widgets.go_on(widgets.button_width(fa.ICON_FA_EYE_DROPPER), right, look.px(14))
-    if imgui.button(fa.ICON_FA_EYE_DROPPER):
-        issued.append(mending.ForgetSource())
-    widgets.tooltip("Copy from another place  (Alt+click; Alt+drag orbits)")
+    tip = "Copy from another place  (Alt+click; Alt+drag orbits)"
+    issued = _button(fa.ICON_FA_EYE_DROPPER, tip, mending.ForgetSource(), right, look.px(14))
     label = f"{fa.ICON_FA_UP_RIGHT_AND_DOWN_LEFT_FROM_CENTER}  Fit"
-    widgets.go_on(widgets.button_width(label), right)
-    if widgets.primary_button(label) if editing.fit else imgui.button(label):
-        issued.append(mending.SetFit(not editing.fit))
-    widgets.tooltip("Scale copies to match the detail there; otherwise they keep their size")
+    tip = "Scale copies to match the detail there; otherwise they keep their size"
+    issued += _button(label, tip, mending.SetFit(not editing.fit), right, on=editing.fit)
     return issued + _radius(state, look, right)
 
 
@@ -263,13 +246,11 @@ def waits(editing: Editing) -> str:
 
 def _levels(reached: Reached, look: Look, right: float) -> list[do.Command]:
     """Less and more of the thing that was clicked."""
-    last = len(reached.levels) - 1
+    last, tip = len(reached.levels) - 1, "Less or more: part, thing, group  ([ and ], or Ctrl+wheel)"
     if not last:
         return []
-    label, width, text = "Size##level", look.px(_LEVELS), f"{reached.level + 1}/{last + 1}"
-    widgets.go_on(widgets.named(label, width), right, look.px(14))
-    tip = "Less or more: part, thing, group  ([ and ], or Ctrl+wheel)"
-    changed, level = widgets.slider(label, reached.level, (0.0, float(last)), text, tip, width)
+    text, limits = f"{reached.level + 1}/{last + 1}", (0.0, float(last))
+    changed, level = _slider("Size##level", reached.level, limits, text, tip, _LEVELS, right, look)
     return [things.SetLevel(round(level))] if changed else []
 
 
@@ -291,9 +272,7 @@ def _actions(right: float) -> list[do.Command]:
     for place, (icon, tip, command) in enumerate(actions):
         if place:
             widgets.go_on(widgets.button_width(icon), right)
-        if imgui.button(icon):
-            issued.append(command)
-        widgets.tooltip(tip)
+        issued += [command] if widgets.toggle(icon, False, tip) else []
     return issued
 
 
@@ -319,50 +298,41 @@ def _growing(state: State, look: Look) -> list[do.Command]:
     return issued
 
 
-def _floaters(state: State, found: Floaters, look: Look, right: float) -> list[do.Command]:
+def _floaters(state: State, look: Look, right: float) -> list[do.Command]:
     """The preview of floaters, in red in the picture."""
     issued: list[do.Command] = []
     imgui.align_text_to_frame_padding()
     imgui.text_colored(theme.BAD, fa.ICON_FA_WAND_MAGIC_SPARKLES)
     imgui.same_line()
-    marks = state.editing.marks
-    if not found.least or marks is None:
+    found, marks = state.editing.floaters, state.editing.marks
+    if found is None or not found.least or marks is None:
         imgui.text("Looking for floaters ...")
         return issued
-    count = len(found.mask(marks.visible))
+    count, strength = len(found.mask(marks.visible)), found.strength
     imgui.text(f"{count:,} to remove" + (" in the selection" if found.within is not None else ""))
-    label, tip, width = "Strength##strength", "How much is removed", look.px(170)
-    widgets.go_on(widgets.named(label, width), right, look.px(14))
-    text = f"{100 * found.strength:.0f} %"
-    changed, strength = widgets.slider(label, found.strength, (0.0, 1.0), text, tip, width)
+    label, text, tip = "Strength##strength", f"{100 * strength:.0f} %", "How much is removed"
+    changed, strength = _slider(label, strength, (0.0, 1.0), text, tip, 170, right, look)
     if changed:
         issued.append(edit.SetStrength(strength))
     return issued + _end_floaters(count, found.open, look, right)
 
 
-def _hiding(state: State, asked: Hiding, look: Look, right: float) -> list[do.Command]:
+def _hiding(state: State, look: Look, right: float) -> list[do.Command]:
     """The ways to hide the selection for good, and how much around it; in red in the picture."""
-    issued: list[do.Command] = []
+    asked, issued = state.editing.hiding, list[do.Command]()
+    assert asked is not None
     imgui.align_text_to_frame_padding()
     imgui.text_colored(theme.SELECTED, fa.ICON_FA_USER_SECRET)
     imgui.same_line()
     imgui.text("Hide for good, in photos too:")
     for place, (how, name, tip) in enumerate(_WAYS):
-        widgets.go_on(widgets.button_width(name), right, look.px(14 if place == 0 else 4))
-        label = f"{name}##{how}"
-        if widgets.primary_button(label) if how == asked.how else imgui.button(label):
-            issued.append(mending.AskToHide(how))
-        widgets.tooltip(tip)
+        gap = look.px(14 if place == 0 else 4)
+        issued += _button(f"{name}##{how}", tip, mending.AskToHide(how), right, gap, how == asked.how)
     issued += _margin(state, asked, look, right)
-    widgets.go_on(widgets.button_width("Hide it"), right, look.px(14))
-    if widgets.primary_button("Hide it##for good"):
-        issued.append(mending.HideForGood(asked.how, asked.margin))
-    widgets.tooltip("You can undo this until the scene is saved; the saved file no longer holds it")
-    widgets.go_on(widgets.button_width("Cancel"), right)
-    if imgui.button("Cancel##hiding"):
-        issued.append(mending.AskToHide(""))
-    widgets.tooltip("Cancel  (Esc)")
-    return issued
+    tip = "You can undo this until the scene is saved; the saved file no longer holds it"
+    hide = mending.HideForGood(asked.how, asked.margin)
+    issued += _button("Hide it##for good", tip, hide, right, look.px(14), True)
+    return issued + _button("Cancel##hiding", "Cancel  (Esc)", mending.AskToHide(""), right)
 
 
 def _margin(state: State, asked: Hiding, look: Look, right: float) -> list[do.Command]:
@@ -370,8 +340,7 @@ def _margin(state: State, asked: Hiding, look: Look, right: float) -> list[do.Co
     tip = "How much around it is hidden too, as a share of a photo's longer side"
     label, text = "Margin##margin", f"{100 * asked.margin:.1f} %"
     limits = (0.0, RECIPE_DEFAULTS.most_margin)
-    widgets.go_on(widgets.named(label, look.px(_MARGIN_SLIDER)), right, look.px(14))
-    changed, margin = widgets.slider(label, asked.margin, limits, text, tip, look.px(_MARGIN_SLIDER))
+    changed, margin = _slider(label, asked.margin, limits, text, tip, _MARGIN_SLIDER, right, look)
     found = None if state.editing.marks is None else asked.mask(state.editing.marks)
     words = "looking ..." if found is None else f"{len(found):,} in all"
     count = 0 if state.scene.info is None else state.scene.info.num_gaussians
@@ -384,28 +353,17 @@ def _margin(state: State, asked: Hiding, look: Look, right: float) -> list[do.Co
 
 def _end_floaters(count: int, opened: bool, look: Look, right: float) -> list[do.Command]:
     """Its rules, and the ways out of the preview of so many."""
-    issued: list[do.Command] = []
-    label = f"{fa.ICON_FA_SLIDERS}  Rules"
-    widgets.go_on(widgets.button_width(label), right, look.px(14))
-    if widgets.primary_button(label) if opened else imgui.button(label):
-        issued.append(clean.ShowRules(not opened))
-    widgets.tooltip("By certainty, size, opacity, colour, distance or photos; by a box; by recipes")
-    widgets.go_on(widgets.button_width("Delete"), right, look.px(14))
+    label, rules = f"{fa.ICON_FA_SLIDERS}  Rules", clean.ShowRules(not opened)
+    tip = "By certainty, size, opacity, colour, distance or photos; by a box; by recipes"
+    issued = _button(label, tip, rules, right, look.px(14), opened)
     imgui.begin_disabled(count == 0)
-    if widgets.primary_button("Delete##floaters"):
-        issued.append(edit.EndFloaters("delete"))
-    widgets.go_on(widgets.button_width("Select"), right)
-    if imgui.button("Select##floaters"):
-        issued.append(edit.EndFloaters("select"))
+    issued += _button("Delete##floaters", "", edit.EndFloaters("delete"), right, look.px(14), True)
+    issued += _button("Select##floaters", "", edit.EndFloaters("select"), right)
     imgui.end_disabled()
-    widgets.go_on(widgets.button_width("Cancel"), right)
-    if imgui.button("Cancel##floaters"):
-        issued.append(edit.EndFloaters())
-    widgets.tooltip("Cancel  (Esc)")
-    return issued
+    return issued + _button("Cancel##floaters", "Cancel  (Esc)", edit.EndFloaters(), right)
 
 
-def _hidden(state: State) -> list[do.Command]:
+def _hidden(state: State, look: Look, right: float) -> list[do.Command]:
     """That something is hidden, and the way back."""
     assert state.editing.marks is not None
     imgui.align_text_to_frame_padding()

@@ -10,7 +10,7 @@ from ... import commands as do
 from ...kit import theme, widgets
 from ...kit.look import Look
 from ...recovery import commands as keep
-from ...recovery.state import Project
+from ...recovery.state import Kept
 from ...scene import samples
 from ...scene.commands import try_out
 from ...scene.drops import SCENE_SUFFIX
@@ -156,7 +156,7 @@ def _tile(name: str, picture: str, corner: ImVec2, size: ImVec2, icon: str, look
     return pressed
 
 
-def _rows(state: State, size: ImVec2, look: Look) -> list[tuple[Project, ...]]:
+def _rows(state: State, size: ImVec2, look: Look) -> list[tuple[Kept, ...]]:
     """Scenes that were open lately, as many as fit, the last one first."""
     projects = state.recovery.projects
     gap, (width, height) = look.px(8), (look.px(side) for side in _TILE)
@@ -167,7 +167,7 @@ def _rows(state: State, size: ImVec2, look: Look) -> list[tuple[Project, ...]]:
     return [shown[start : start + columns] for start in range(0, len(shown), columns)]
 
 
-def _projects(rows: list[tuple[Project, ...]], at: ImVec2, look: Look) -> list[do.Command]:
+def _projects(rows: list[tuple[Kept, ...]], at: ImVec2, look: Look) -> list[do.Command]:
     """A tile each, the middle of the first row at `at`."""
     issued: list[do.Command] = []
     gap, (width, height) = look.px(8), (look.px(side) for side in _TILE)
@@ -180,28 +180,28 @@ def _projects(rows: list[tuple[Project, ...]], at: ImVec2, look: Look) -> list[d
     return issued
 
 
-def _project(project: Project, corner: ImVec2, look: Look) -> list[do.Command]:
+def _project(project: Kept, corner: ImVec2, look: Look) -> list[do.Command]:
     """The tile of a scene: what was seen of it, what it is called, when it was open, what it holds."""
     issued: list[do.Command] = []
     size = look.vec(*_TILE)
-    pressed = _tile(f"##project {project.path}", project.picture, corner, size, fa.ICON_FA_CUBE, look)
-    held = (project.path, *(phrase for phrase in project.kept.phrases if phrase.strip()))
+    pressed = _tile(f"##project {project.scene}", project.picture, corner, size, fa.ICON_FA_CUBE, look)
+    held = (project.scene, *(phrase for phrase in project.phrases if phrase.strip()))
     widgets.tooltip("\n".join(held))
     if pressed:
-        issued.append(keep.OpenProject(project.path))
+        issued.append(keep.OpenProject(project.scene))
     elif imgui.is_item_focused() and imgui.is_key_pressed(imgui.Key.delete):
-        issued.append(keep.ForgetRecent(project.path))
+        issued.append(keep.ForgetRecent(project.scene))
     side = imgui.get_frame_height()
     below, canvas = corner.y + size.y + look.px(4), imgui.get_window_draw_list()
-    name = widgets.shortened(Path(project.path).name.removesuffix(SCENE_SUFFIX), size.x - side)
+    name = widgets.shortened(Path(project.scene).name.removesuffix(SCENE_SUFFIX), size.x - side)
     canvas.add_text(ImVec2(corner.x, below), widgets.u32(theme.TEXT), name)
     when = "" if project.when is None else f"{project.when:%d %B, %H:%M}"
-    for line, text in enumerate((when, project.sentence())):
+    for line, text in enumerate((when, project.project_sentence())):
         place = ImVec2(corner.x, below + (line + 1) * look.px(18))
         canvas.add_text(place, widgets.u32(theme.MUTED), widgets.shortened(text, size.x))
     imgui.set_cursor_screen_pos(ImVec2(corner.x + size.x - side, below - look.px(6)))
-    label, tip = f"{fa.ICON_FA_XMARK}##forget {project.path}", "Remove from this list  (Delete)"
-    return issued + widgets.press(label, keep.ForgetRecent(project.path), tip, quiet=True)
+    label, tip = f"{fa.ICON_FA_XMARK}##forget {project.scene}", "Remove from this list  (Delete)"
+    return issued + widgets.press(label, keep.ForgetRecent(project.scene), tip, quiet=True)
 
 
 def _sample_words(at: ImVec2, room: float, look: Look) -> list[do.Command]:

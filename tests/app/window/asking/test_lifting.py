@@ -1,7 +1,8 @@
 """A splat file that answers no phrases: the offer to teach it, what comes of that, and the way back."""
 
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -10,12 +11,11 @@ import torch
 from app.window.asking import lifting
 from app.window.asking.effects import AskingEffects
 from app.window.asking.panels import prompts
-from app.window.commands import Command, ShowPicture, apply
+from app.window.commands import ShowPicture
 from app.window.editing import commands as edit
-from app.window.effects import Hands
 from app.window.frame import table
 from app.window.kit import theme, widgets
-from app.window.requests import Job, Task
+from app.window.requests import Job
 from app.window.scene import commands as show
 from app.window.scene.effects import SceneEffects
 from app.window.scene.work import describe_scene
@@ -26,28 +26,18 @@ from langflash_core.scene.edits import Marks
 from langflash_core.scene.mask import Mask
 from langflash_core.types import Scene, Semantics
 from tests.app.window import headless
-from tests.app.window.scene.test_rooms import Nothing
+from tests.app.window.desk import Bare, Nothing
 from tests.app.window.scenes import room, shown_scene, told
 
 
-@dataclass
-class Desk:
-    """A session without its window, with the effects of scene and asking."""
-
-    state: State = field(default_factory=State)
-    asked: list[Job | Task] = field(default_factory=list)
+class Desk(Bare):
+    """With the effects of scene and asking."""
 
     def __post_init__(self) -> None:
-        hands = Hands(self.perform, self.perform, self.asked.append, lambda: None, lambda: self.state.now)
-        nothing = Nothing()
-        scene = SceneEffects(hands, nothing, nothing, str)  # type: ignore[arg-type]
-        self.effects = (scene, AskingEffects(hands, nothing))  # type: ignore[arg-type]
-
-    def perform(self, *commands: Command) -> None:
-        for command in commands:
-            before, self.state = self.state, apply(self.state, command)
-            for each in self.effects:
-                each.follow(command, before, self.state)
+        super().__post_init__()
+        nothing: Any = Nothing()
+        scene = SceneEffects(self.hands, nothing, nothing, print)
+        self.followers = (scene, AskingEffects(self.hands, nothing))
 
     def teach(self, cancelled: Callable[[], bool] = lambda: False) -> None:
         """What the worker makes of the one job that was asked for."""

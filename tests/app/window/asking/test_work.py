@@ -13,6 +13,7 @@ from app.window.asking import work
 from app.window.asking.prompt_sets import read_prompts
 from app.window.asking.state import BINS
 from app.window.asking.work import Encode
+from app.window.drawing.values import View
 from app.window.editing import work as editing_work
 from app.window.editing.effects import EditingEffects
 from app.window.effects import Hands
@@ -60,7 +61,7 @@ def test_histograms_count_covered_pixels_by_score(scene) -> None:
     frame = render(scene, camera)
     assert frame.weight_maps is not None
     relevance = relevance_maps(frame.weight_maps, query)
-    answered, made = work.Answer(3, (5, 8), relevance, frame, camera, query).run(lambda: False)
+    answered, made = work.Answer(3, View(3, (5, 8), frame, relevance, camera, query, 0)).run(lambda: False)
     assert isinstance(answered, ask.Answered) and isinstance(made, ask.Binned)
     assert [(h.key, h.text) for h in made.histograms] == [(5, "armchair"), (8, "elephant")]
     covered = frame.alphas >= 0.5

@@ -117,4 +117,4 @@ def test_clones_come_back_after_a_crash_with_every_stroke_to_undo(cloned: Desk) 
     assert len(on_show(again).gaussians) < len(shown.gaussians)
     again.perform(edit.Undo())
     assert len(on_show(again).gaussians) == COUNT
-    again.recovery.close(again.state, crashed=False)
+    again.effects.close(again.state, crashed=False)

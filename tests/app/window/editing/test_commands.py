@@ -19,7 +19,7 @@ from app.window.state import State
 from langflash_core.base import pictures
 from langflash_core.scene.edited import edited_scene
 from langflash_core.scene.edits import Combine, Mask
-from tests.app.window.scenes import CHAIR, after
+from tests.app.window.scenes import CHAIR, after, labels
 
 CHAIRS = 2500  # the first rows of the room are its block
 
@@ -32,11 +32,6 @@ def rows(first: int, last: int, count: int = 12_300) -> Mask:
 
 def found(first: int, last: int, combine: Combine = "replace") -> edit.Found:
     return edit.Found(rows(first, last), combine, "in a box")
-
-
-def labels(state: State) -> list[str]:
-    assert state.editing.history is not None
-    return [entry.label for entry in state.editing.history.done]
 
 
 def selected(state: State) -> Mask:

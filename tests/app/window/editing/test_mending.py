@@ -2,31 +2,27 @@
 
 from collections.abc import Callable, Iterator
 from contextlib import suppress
-from dataclasses import dataclass, field
 from pathlib import Path
+from typing import Any
 
-import numpy as np
 import pytest
 import torch
 
 from app.places import state_folder
-from app.window.commands import Command, OfScene, Tick, apply
+from app.window.commands import Tick
 from app.window.editing import commands as edit
 from app.window.editing import mending, placing
 from app.window.editing import pointing as point
 from app.window.editing.effects import EditingEffects
 from app.window.editing.state import Region, Tool
-from app.window.effects import Hands
 from app.window.recovery import edits
-from app.window.recovery.effects import KEEP_AFTER, RecoveryEffects
-from app.window.recovery.keeper import Keeper
-from app.window.recovery.sessions import EDITED
+from app.window.recovery.effects import KEEP_AFTER
+from app.window.recovery.records import EDITED
 from app.window.recovery.work import KeepCopy
-from app.window.requests import Job, SceneTask, Task
+from app.window.requests import Task
 from app.window.scene import commands as show
 from app.window.scene.effects import SceneEffects
 from app.window.scene.work import describe_scene
-from app.window.state import State
 from langflash_core.errors import InputError
 from langflash_core.mending.hiding import preview
 from langflash_core.mending.looks import draw_scene
@@ -34,7 +30,8 @@ from langflash_core.mending.settings import RECIPE_DEFAULTS
 from langflash_core.scene.changes import Moved
 from langflash_core.scene.file import load, save
 from langflash_core.scene.mask import Mask
-from tests.app.window.scene.test_rooms import Nothing
+from tests.app.window.desk import Desk as Keeping
+from tests.app.window.desk import Nothing
 from tests.app.window.scenes import room
 
 COUNT, BLOCK = 12_300, 2500
@@ -46,48 +43,23 @@ class Pictured(Nothing):
     size = (448, 336)
 
 
-@dataclass
-class Desk:
-    """A session without its window, with the effects of scene, editing and recovery."""
-
-    state: State = field(default_factory=State)
-    asked: list[Job | Task] = field(default_factory=list)
+class Desk(Keeping):
+    """With the effects of scene, editing and recovery."""
 
     def __post_init__(self) -> None:
-        hands = Hands(self.perform, self.perform, self.asked.append, lambda: None, lambda: self.state.now)
-        nothing = Pictured()
-        self.keeper = Keeper()
-        self.recovery = RecoveryEffects(hands, self.keeper)
-        scene = SceneEffects(hands, nothing, nothing, str)  # type: ignore[arg-type]
-        self.effects = (scene, EditingEffects(hands, nothing), self.recovery)  # type: ignore[arg-type]
+        super().__post_init__()
+        nothing: Any = Pictured()
+        scene = SceneEffects(self.hands, nothing, nothing, print)
+        self.followers = (scene, EditingEffects(self.hands, nothing), self.effects)
 
-    def perform(self, *commands: Command) -> None:
-        for command in commands:
-            if isinstance(command, OfScene):
-                if not command.holds(self.state):
-                    continue
-                command = command.command
-            before, self.state = self.state, apply(self.state, command)
-            for each in self.effects:
-                each.follow(command, before, self.state)
-
-    def work(self, serial: int = 7) -> None:
-        """All that was asked of the worker, but for words and what only draws."""
-        while self.asked:
-            request = self.asked.pop(0)
-            if type(request).__name__ in ("NameAtoms", "Thin"):
-                continue
-            if isinstance(request, Job):
-                self.perform(request.run(serial, lambda *_: None, lambda: False))
-                continue
-            for command in request.run(lambda: False):
-                about = isinstance(request, SceneTask)
-                self.perform(OfScene(request.serial, command) if about else command)
+    def work(self, serial: int = 7, without: tuple[str, ...] = ("NameAtoms", "Thin")) -> None:
+        """But for words and what only draws."""
+        super().work(serial, without)
 
     def rest(self) -> None:
         self.perform(Tick(self.state.now + 2 * KEEP_AFTER))
-        self.recovery.tick(self.state, self.state.now)
-        self.recovery._writer.submit(lambda: None).result()  # it has written all that it was given
+        self.effects.tick(self.state, self.state.now)
+        self.written()
         self.work()
 
 
@@ -101,7 +73,7 @@ def desk(folders: Path, tmp_path: Path) -> Iterator[Desk]:
     desk.perform(edit.Found(Mask.first(COUNT, BLOCK), "replace", "here"))
     desk.rest()
     yield desk
-    desk.recovery.close(desk.state, crashed=False)
+    desk.effects.close(desk.state, crashed=False)
 
 
 def kept_of(path: Path) -> list[bytes]:
@@ -304,15 +276,6 @@ def test_without_a_selection_nothing_happens(desk: Desk) -> None:
         mending.AskToHide(), mending.HideForGood("blur", RECIPE_DEFAULTS.margin), mending.FillSelection()
     )
     assert desk.state == before and not desk.asked
-
-
-def test_clean_up_keeps_to_the_selection(desk: Desk) -> None:
-    desk.perform(edit.FindFloaters())
-    desk.work()
-    least = np.zeros(COUNT, np.float32)
-    desk.perform(edit.FloatersFound(least.tobytes()), edit.SetStrength(0.3), edit.EndFloaters("delete"))
-    marks = desk.state.editing.marks
-    assert marks is not None and len(marks.deleted) == BLOCK
 
 
 def test_a_stroke_of_the_clone_brush_is_one_edit_and_the_next_begins_at_the_same_source(desk: Desk) -> None:

@@ -31,7 +31,7 @@ from langflash_core.scene.changed import changed_scene
 from langflash_core.scene.changes import Moved, turn_about
 from langflash_core.scene.edited import edited_scene
 from langflash_core.scene.mask import Mask
-from tests.app.window.scenes import CHAIR, after, room
+from tests.app.window.scenes import CHAIR, after, labels, room
 
 BLOCK = Mask.first(12_300, 2500)  # the first rows of the room are its block
 
@@ -47,11 +47,6 @@ def chosen(info) -> State:
     return after(
         State(), show.SceneArrived(info), edit.Found(BLOCK, "replace", "here"), SetHandle(Handle.MOVE)
     )
-
-
-def labels(state: State) -> list[str]:
-    assert state.editing.history is not None
-    return [entry.label for entry in state.editing.history.done]
 
 
 def means(state: State) -> np.ndarray:

@@ -13,13 +13,13 @@ from app.window.editing.effects import EditingEffects
 from app.window.editing.panels.tools import waits
 from app.window.editing.state import Tool
 from app.window.editing.things import Outlined, SetLevel, StepLevel, ThingFound
-from app.window.effects import Hands
 from app.window.frame import table
 from app.window.scene import commands as show
 from app.window.state import State
 from langflash_core.scene.mask import Mask
+from tests.app.window.desk import Bare
 from tests.app.window.editing.test_mending import BLOCK, Desk, desk
-from tests.app.window.scenes import after
+from tests.app.window.scenes import after, labels
 
 __all__ = ["desk"]  # a fixture
 LEVELS = tuple(Mask.first(12_300, count) for count in (100, BLOCK, 5000))
@@ -30,11 +30,6 @@ def clicked(info) -> State:
     """A click found three levels, the second of them a thing."""
     state = after(State(), show.SceneArrived(info), point.SetTool(Tool.PICK))
     return after(state, edit.SelectThing((1.0, 2.0)), ThingFound(LEVELS, 1, "replace"))
-
-
-def labels(state: State) -> list[str]:
-    assert state.editing.history is not None
-    return [entry.label for entry in state.editing.history.done]
 
 
 def test_a_click_is_one_edit_however_its_level_is_moved(clicked: State) -> None:
@@ -90,9 +85,9 @@ class _Place:
 
 
 def test_a_line_is_asked_for_once_the_selection_and_the_place_rest(clicked: State) -> None:
-    asked: list = []
-    hands = Hands(lambda *_: None, lambda *_: None, asked.append, lambda: None, lambda: 0.0)
-    effects = EditingEffects(hands, _Place())  # type: ignore[arg-type]
+    desk = Bare(clicked)
+    asked: list = desk.asked
+    effects = EditingEffects(desk.hands, _Place())  # type: ignore[arg-type]
     effects.after_picture(clicked)
     assert not asked, "it may move on"
     for _ in range(3):
@@ -111,12 +106,11 @@ def test_a_line_is_asked_for_once_the_selection_and_the_place_rest(clicked: Stat
 
 
 def test_things_are_prepared_once_the_tool_is_taken(clicked: State) -> None:
-    asked: list = []
-    hands = Hands(lambda *_: None, lambda *_: None, asked.append, lambda: None, lambda: 0.0)
-    effects, taken = EditingEffects(hands, _Place()), point.SetTool(Tool.PICK)  # type: ignore[arg-type]
+    desk, taken = Bare(clicked), point.SetTool(Tool.PICK)
+    effects = EditingEffects(desk.hands, _Place())  # type: ignore[arg-type]
     assert after(clicked, edit.SelectThing((5.0, 5.0))).editing.waiting == "Finding things"
     effects.follow(taken, clicked, after(clicked, taken))
-    (prepares,) = asked
+    (prepares,) = desk.asked
     assert isinstance(prepares, work.PrepareThings)
     waiting, told = after(clicked, edit.SelectThing((5.0, 5.0))), []
     for command in prepares.run(lambda: False):

@@ -1,7 +1,5 @@
 """Editing as a person does it: real clicks, drags and keys on a real window."""
 
-import os
-import signal
 from collections.abc import Iterator
 from pathlib import Path
 
@@ -206,31 +204,6 @@ def test_a_polygon_is_clicked_corner_by_corner_and_a_lasso_is_drawn(program: Pro
     program.xdotool("sleep", "0.7", "mousedown", "1", "sleep", "0.7", *sum(steps, ()), "mouseup", "1")
     drawn = program.until(lambda s: s["selected"] > 0 and not s["waiting"], "the lasso")["selected"]
     assert drawn == pytest.approx(clicked, rel=0.1)
-
-
-def test_a_crash_loses_no_edit(display: str, scene_file: Path, state_folder: Path) -> None:
-    running = Program(display, scene_file)
-    running.until(lambda s: s["scene"] == "room.langflash", "the scene")
-    running.at_rest()
-    running.xdotool("mousemove", *map(str, MIDDLE), "key", "ctrl+a")
-    running.until(lambda s: s["selected"] == 12_300, "everything selected")
-    running.xdotool("key", "Delete")
-    running.until(lambda s: s["deleted"] == 12_300, "everything deleted")
-    end = PATIENCE
-    while not list(state_folder.glob("*.edits")) and end > 0:
-        running.at_rest()
-        end -= 1
-    os.kill(running.pid, signal.SIGKILL)
-    running.leave()
-    again = Program(display, scene_file)
-    again.until(lambda s: s["offer"] == 2, "the offer")
-    again.at_rest()
-    again.click("Restore")
-    state = again.until(lambda s: s["deleted"] == 12_300 and s["job"] is None, "the restored edits")
-    assert state["edits"] == ["Select all", "Delete 12,300"] and state["scene"] == "room.langflash"
-    again.xdotool("mousemove", *map(str, MIDDLE), "key", "ctrl+z")
-    again.until(lambda s: s["deleted"] == 0, "undo over the crash")
-    again.leave()
 
 
 def test_a_thing_is_hidden_for_good_and_brought_back_until_it_is_saved(program: Program) -> None:

@@ -221,11 +221,6 @@ def test_atoms_are_named(info) -> None:
     assert [row[0] for row in names] == list(PHRASES)
 
 
-def test_floaters_are_scored_for_every_row(info) -> None:
-    floaters = result(work.ScoreFloaters(*scene_of(info)))
-    assert isinstance(floaters, edit.FloatersFound) and len(floaters.least) == 4 * 12_300
-
-
 def test_with_parallel_rays_a_region_a_ball_and_a_click_take_what_they_show(info) -> None:
     own = info.views[0]
     flat = orthographic(own, *info.extent)

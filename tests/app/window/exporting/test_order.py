@@ -15,7 +15,7 @@ from app.window.exporting import order as export_form
 from app.window.exporting.effects import ExportingEffects
 from app.window.exporting.process import Exporter
 from app.window.recovery import commands as keep
-from app.window.recovery.keeper import Keeper
+from app.window.recovery.records import Keeper
 from app.window.scene import camera
 from app.window.scene import commands as show
 from app.window.scene.near import photos_known

@@ -5,7 +5,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from app.window.recovery import preferences, projects
+from app.window.recovery import preferences, records, tiles
 from app.window.recovery.preferences import DEFAULTS
 from app.window.recovery.state import Kept
 from langflash_core.base.resources import asset_path
@@ -53,9 +53,10 @@ def test_a_scene_that_was_open_lately_is_a_tile_that_opens_as_it_was_left(
     monkeypatch.setenv("LANGFLASH_STATE", str(tmp_path / "state"))
     preferences.save(DEFAULTS.opened(scene_file))
     pose = Pose(Vector(0.1, 0.0, 0.0))
-    projects.keep(Kept(scene=str(scene_file), phrases=("wall",), likes=("",), mode="depth", pose=pose), 2)
+    left = Kept(scene=str(scene_file), phrases=("wall",), likes=("",), mode="depth", pose=pose, views=2)
+    records.keep_project(left)
     pink = np.full((180, 270, 3), (255, 0, 160), np.uint8)
-    projects.keep_picture(str(scene_file), pink, projects.stamp(scene_file))
+    tiles.keep_picture(str(scene_file), pink, tiles.stamp(scene_file))
     program = Program(display)
     left, top, right, bottom = program.box(f"##project {scene_file}")
     program.until(lambda s: program.client.picture(*SIZE)[(top + bottom) // 2, left + 20, 1] < 20, "the tile")

@@ -52,9 +52,9 @@ def test_edits_are_offered_and_restored_whole(info, state_folder: Path) -> None:
     again = restore(offer)
     assert again.history == history and again.name == "room" and again.path == Path("/p/room.langflash")  # type: ignore[attr-defined]
     assert edits.find(None) == offer
-    assert done(work.ForgetEdits(info.scene, "somebody else")) == []
+    assert done(work.Forget(lambda: edits.forget_edits(info.scene, "somebody else"))) == []
     assert edits.find(info.scene) == offer
-    assert done(work.ForgetEdits(info.scene, "me")) == []
+    assert done(work.Forget(lambda: edits.forget_edits(info.scene, "me"))) == []
     assert edits.find(info.scene) is None and list(state_folder.iterdir()) == []
 
 

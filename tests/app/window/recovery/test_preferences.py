@@ -6,10 +6,11 @@ from pathlib import Path
 
 import pytest
 
+from app.window.asking.commands import OpenDictionary
 from app.window.commands import Command
 from app.window.recovery import locks, panels, preferences
 from app.window.recovery.commands import Prefer
-from app.window.recovery.preferences import DEFAULTS, MOST_RECENT, Preferences
+from app.window.recovery.preferences import DEFAULTS, MOST_RECENT, PANEL_WIDTHS, Preferences
 from app.window.state import State
 from tests.app.window.headless import context, frames, look
 from tests.torture.failing import failing
@@ -139,3 +140,14 @@ def test_a_window_that_never_ends_writing_is_waited_for_and_said(folders: Path, 
 def test_a_folder_that_cannot_be_written_is_a_sentence(folders: Path) -> None:
     (folders / "config").write_text("a file in the way")
     assert "could not be saved" in preferences.try_to_save(DEFAULTS)
+
+
+def test_the_layout_is_kept_within_its_limits() -> None:
+    wanted = replace(State().preferences, panel_width=9999.0, dictionary=(1, 2, 380, 300))
+    state = OpenDictionary(True).apply(Prefer(wanted).apply(State()))
+    kept = state.preferences
+    assert (kept.panel_width, kept.dictionary, kept.dictionary_open) == (
+        PANEL_WIDTHS[1],
+        (1, 2, 380, 300),
+        True,
+    )

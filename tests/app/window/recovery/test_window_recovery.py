@@ -65,4 +65,5 @@ def test_a_killed_session_comes_back_whole(display: str, scene_file: Path, folde
     again.client.ask_to_close(again.window)
     assert again.ended() == 0
     again.leave()
-    assert list(state.iterdir()) == []
+    assert {file.suffix for file in state.iterdir() if file.name.startswith("project-")} == {".json", ".jpg"}
+    assert not [file for file in state.iterdir() if not file.name.startswith("project-")]
