@@ -35,7 +35,20 @@ def doubtful(record: Record, num_views: int) -> dict[int, str]:
 def told_warnings(record: Record, num_views: int) -> tuple[str, ...]:
     """A scene's warnings, and which of its photos do not look right."""
     line = doubt_line(record, num_views)
-    return (*record.warnings, line) if line else record.warnings
+    return (*join_alike(record.warnings, record.photos), *((line,) if line else ()))
+
+
+def join_alike(notes: Sequence[str], names: Sequence[str]) -> tuple[str, ...]:
+    """Notes of photos so named, with those that say the same of several as one: "photos 3 and 5 are dark"."""
+    views_of: dict[str, list[int]] = {}
+    for note in notes:
+        view = next((view for view, name in enumerate(names) if name and note.startswith(f"{name} ")), None)
+        said, views = (note, []) if view is None else (note[len(names[view]) :], [view])
+        views_of.setdefault(said, []).extend(views)
+    return tuple(
+        f"{_photos(views)}{_plural(said)}" if len(views) > 1 else f"{names[views[0]] if views else ''}{said}"
+        for said, views in views_of.items()
+    )
 
 
 def doubt_line(record: Record, num_views: int) -> str:
@@ -102,6 +115,13 @@ def _photos(views: Sequence[int]) -> str:
     if more:
         named.append("another one" if more == 1 else f"{more} others")
     return f"photo{'s' * (len(views) > 1)} {_list_parts(named)}"
+
+
+def _plural(said: str) -> str:
+    """What `images.triage` says of one photo, of several."""
+    for one, many in ((" is ", " are "), (" has ", " have ")):
+        said = said.replace(one, many, 1) if said.startswith(one) else said
+    return said.replace(" of it ", " of each ").replace(" it ", " them ")
 
 
 def _list_parts(parts: Sequence[str]) -> str:

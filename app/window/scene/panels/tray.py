@@ -10,6 +10,7 @@ from langflash_core.base.records import FoundLens
 from langflash_core.base.running import time_left
 from langflash_core.geometry.poses import FOV_RANGE
 from langflash_core.images.still_names import shown_name
+from langflash_core.scene.doubts import join_alike
 
 from ... import commands as do
 from ...kit import theme, widgets
@@ -62,9 +63,12 @@ def _row(state: State, look: Look) -> list[do.Command]:
 
 
 def _sentences(state: State) -> list[str]:
-    """Each once: what the tray says of a photo, the scene made of it says again."""
+    """Each once: what is known of a photo, the scene made of it says."""
     said = [photo.problem for photo in state.scene.photos if photo.problem]
-    said += [note for photo in state.scene.photos for note in photo.notes]
+    names = [shown_name(photo.path.name) for photo in state.scene.photos]
+    made = state.scene.info.scene.record.photos if state.scene.info else ()
+    alone = [photo.notes for name, photo in zip(names, state.scene.photos, strict=True) if name not in made]
+    said += join_alike([note for notes in alone for note in notes], names)
     said += state.scene.info.warnings if state.scene.info else ()
     if state.scene.info is not None and len(state.scene.info.views) == 1 and state.scene.info.scene.photos:
         said.append(ONE_PHOTO)
