@@ -34,21 +34,25 @@ def doubtful(record: Record, num_views: int) -> dict[int, str]:
 
 def told_warnings(record: Record, num_views: int) -> tuple[str, ...]:
     """A scene's warnings, and which of its photos do not look right."""
-    line = doubt_line(record, num_views)
-    return (*join_alike(record.warnings, record.photos), *((line,) if line else ()))
+    line, gone = doubt_line(record, num_views), record.left_out.get("unplaced")
+    names = [name for name in gone if isinstance(name, str)] if isinstance(gone, list | tuple) else []
+    return (*join_alike(record.warnings, record.photos, names), *((line,) if line else ()))
 
 
-def join_alike(notes: Sequence[str], names: Sequence[str]) -> tuple[str, ...]:
-    """Notes of photos so named, with those that say the same of several as one: "photos 3 and 5 are dark"."""
-    views_of: dict[str, list[int]] = {}
+def join_alike(notes: Sequence[str], names: Sequence[str], gone: Sequence[str] = ()) -> tuple[str, ...]:
+    """Notes of photos so named, with those that say the same of several as one: "photos 3 and 5 are dark".
+    gone: names of others, which have no number."""
+    of_whom: dict[str, list[str]] = {}
     for note in notes:
-        view = next((view for view, name in enumerate(names) if name and note.startswith(f"{name} ")), None)
-        said, views = (note, []) if view is None else (note[len(names[view]) :], [view])
-        views_of.setdefault(said, []).extend(views)
-    return tuple(
-        f"{_photos(views)}{_plural(said)}" if len(views) > 1 else f"{names[views[0]] if views else ''}{said}"
-        for said, views in views_of.items()
-    )
+        begins = (name for name in (*names, *gone) if name and note.startswith((f"{name} ", f"{name}: ")))
+        who = next(begins, "")
+        of_whom.setdefault(note[len(who) :], []).append(who)
+    told = list[str]()
+    for said, who in of_whom.items():
+        numbered = all(name in names for name in who)
+        subject = _photos([names.index(name) for name in who]) if numbered else _list_some(who)
+        told.append(f"{subject}{_plural(said)}" if len(who) > 1 and all(who) else f"{who[0]}{said}")
+    return tuple(told)
 
 
 def doubt_line(record: Record, num_views: int) -> str:
@@ -110,18 +114,21 @@ def _numbers(told: Mapping[str, Any], name: str, count: int) -> list[float | Non
 
 def _photos(views: Sequence[int]) -> str:
     """Counted from 1."""
-    named = [str(view + 1) for view in views[: DOUBTS.told]]
-    more = len(views) - len(named)
-    if more:
+    return f"photo{'s' * (len(views) > 1)} {_list_some([str(view + 1) for view in views])}"
+
+
+def _list_some(names: Sequence[str]) -> str:
+    named, more = list(names[: DOUBTS.told]), len(names) - DOUBTS.told
+    if more > 0:
         named.append("another one" if more == 1 else f"{more} others")
-    return f"photo{'s' * (len(views) > 1)} {_list_parts(named)}"
+    return _list_parts(named)
 
 
 def _plural(said: str) -> str:
-    """What `images.triage` says of one photo, of several."""
+    """What is said of one photo, of several."""
     for one, many in ((" is ", " are "), (" has ", " have ")):
         said = said.replace(one, many, 1) if said.startswith(one) else said
-    return said.replace(" of it ", " of each ").replace(" it ", " them ")
+    return said.replace(" of it ", " of each ").replace(" it is ", " they are ").replace(" it ", " them ")
 
 
 def _list_parts(parts: Sequence[str]) -> str:

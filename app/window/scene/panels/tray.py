@@ -24,6 +24,7 @@ from . import rooms, stages
 
 COLUMNS, MORE = 3, 5  # photos side by side; the second where there are over 12
 _CANCEL = 104.0  # design pixels
+WHOLE = 2  # warnings that leave room in a low window for the phrases' field
 NOTABLE_SECONDS = 0.05  # of a finished stage; a shorter one is only a heading of others
 HOW_TO_TELL = "click a photo to set it"
 WITHOUT_PHOTOS = "open the photos to set it"
@@ -42,8 +43,9 @@ def draw(state: State, look: Look) -> list[do.Command]:
     else:
         _hint(look)
     issued += _row(state, look)
-    short = bool(state.asking.asked) and not widgets.high(look)
-    for sentence in _sentences(state):
+    said = _sentences(state)
+    short = not widgets.high(look) and (bool(state.asking.asked) or len(said) > WHOLE)
+    for sentence in said:
         _warning(sentence, short)
     stages.draw(state, look)
     return issued
