@@ -34,18 +34,17 @@ def doubtful(record: Record, num_views: int) -> dict[int, str]:
 
 def told_warnings(record: Record, num_views: int) -> tuple[str, ...]:
     """A scene's warnings, and which of its photos do not look right."""
-    line, gone = doubt_line(record, num_views), record.left_out.get("unplaced")
-    names = [name for name in gone if isinstance(name, str)] if isinstance(gone, list | tuple) else []
-    return (*join_alike(record.warnings, record.photos, names), *((line,) if line else ()))
+    line = doubt_line(record, num_views)
+    return (*join_alike(record.warnings, record.photos), *((line,) if line else ()))
 
 
-def join_alike(notes: Sequence[str], names: Sequence[str], gone: Sequence[str] = ()) -> tuple[str, ...]:
-    """Notes of photos so named, with those that say the same of several as one: "photos 3 and 5 are dark".
-    gone: names of others, which have no number."""
+def join_alike(notes: Sequence[str], names: Sequence[str]) -> tuple[str, ...]:
+    """Notes of photos so named, with those that say the same of several as one: "photos 3 and 5 are dark". Of
+    photos that were left out, which have no number, "NAME: what became of it" is joined by names."""
     of_whom: dict[str, list[str]] = {}
     for note in notes:
-        begins = (name for name in (*names, *gone) if name and note.startswith((f"{name} ", f"{name}: ")))
-        who = next(begins, "")
+        named = next((name for name in names if name and note.startswith(f"{name} ")), "")
+        who = named or (note.partition(": ")[0] if ": " in note else "")
         of_whom.setdefault(note[len(who) :], []).append(who)
     told = list[str]()
     for said, who in of_whom.items():

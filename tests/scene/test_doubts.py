@@ -93,7 +93,7 @@ def test_photos_that_were_left_out_for_one_reason_are_one_sentence():
     """By their names, since the scene does not number them; files of before have a sentence of each."""
     names = ("0102.jpg", "0108.jpg", "0114.jpg")
     said = ": too little of it could be matched with the other photos, so it is left out; take others"
-    record = Record(warnings=tuple(name + said for name in names), left_out={"unplaced": list(names)})
+    record = Record(warnings=tuple(name + said for name in names))
     assert told_warnings(record, 2) == (
         "0102.jpg, 0108.jpg and 0114.jpg: too little of each could be matched with the other photos, so they "
         "are left out; take others",
