@@ -64,7 +64,7 @@ def crop_notes(photo: PhotoFacts, box: tuple[float, float, float, float] | None,
     aspect = max(photo.width / photo.height, photo.height / photo.width)
     if aspect > 2.0:
         return [
-            f"{photo.name} is {aspect:.1f} times as long as it is wide, only its centre is used; "
+            f"{photo.name} is {aspect:.1f} times as long as wide, only the centre is used; "
             "panoramas do not follow one lens, use plain photos"
         ]
     if box is None:

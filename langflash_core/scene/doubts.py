@@ -35,7 +35,23 @@ def doubtful(record: Record, num_views: int) -> dict[int, str]:
 def told_warnings(record: Record, num_views: int) -> tuple[str, ...]:
     """A scene's warnings, and which of its photos do not look right."""
     line = doubt_line(record, num_views)
-    return (*record.warnings, line) if line else record.warnings
+    return (*join_alike(record.warnings, record.photos), *((line,) if line else ()))
+
+
+def join_alike(notes: Sequence[str], names: Sequence[str]) -> tuple[str, ...]:
+    """Notes of photos so named, with those that say the same of several as one: "photos 3 and 5 are dark". Of
+    photos that were left out, which have no number, "NAME: what became of it" is joined by names."""
+    of_whom: dict[str, list[str]] = {}
+    for note in notes:
+        named = next((name for name in names if name and note.startswith(f"{name} ")), "")
+        who = named or (note.partition(": ")[0] if ": " in note else "")
+        of_whom.setdefault(note[len(who) :], []).append(who)
+    told = list[str]()
+    for said, who in of_whom.items():
+        numbered = all(name in names for name in who)
+        subject = _photos([names.index(name) for name in who]) if numbered else _list_some(who)
+        told.append(f"{subject}{_plural(said)}" if len(who) > 1 and all(who) else f"{who[0]}{said}")
+    return tuple(told)
 
 
 def doubt_line(record: Record, num_views: int) -> str:
@@ -97,11 +113,21 @@ def _numbers(told: Mapping[str, Any], name: str, count: int) -> list[float | Non
 
 def _photos(views: Sequence[int]) -> str:
     """Counted from 1."""
-    named = [str(view + 1) for view in views[: DOUBTS.told]]
-    more = len(views) - len(named)
-    if more:
+    return f"photo{'s' * (len(views) > 1)} {_list_some([str(view + 1) for view in views])}"
+
+
+def _list_some(names: Sequence[str]) -> str:
+    named, more = list(names[: DOUBTS.told]), len(names) - DOUBTS.told
+    if more > 0:
         named.append("another one" if more == 1 else f"{more} others")
-    return f"photo{'s' * (len(views) > 1)} {_list_parts(named)}"
+    return _list_parts(named)
+
+
+def _plural(said: str) -> str:
+    """What is said of one photo, of several."""
+    for one, many in ((" is ", " are "), (" has ", " have ")):
+        said = said.replace(one, many, 1) if said.startswith(one) else said
+    return said.replace(" of it ", " of each ").replace(" it is ", " they are ").replace(" it ", " them ")
 
 
 def _list_parts(parts: Sequence[str]) -> str:

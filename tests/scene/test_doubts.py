@@ -76,6 +76,30 @@ def test_what_was_said_of_a_photo_by_name_is_said_again():
     assert doubtful(record, 2) == {1: f"{notes[0]}."} and doubt_line(record, 2) == ""
 
 
+def test_notes_that_say_the_same_of_several_photos_are_one():
+    photos = tuple("abcde")
+    dark, blurred = "is very dark; take it again with more light", "is blurred; hold the camera still"
+    burnt = "is over-exposed, more than half of it is pure white; expose it less"
+    notes = (f"a {dark}", f"b {blurred}", f"c {dark}", "no lens", f"d {burnt}", f"e {burnt}", f"e {dark}")
+    assert told_warnings(Record(photos=photos, warnings=notes), 5) == (
+        "photos 1, 3 and 5 are very dark; take them again with more light",
+        f"b {blurred}",
+        "no lens",
+        "photos 4 and 5 are over-exposed, more than half of each is pure white; expose them less",
+    )
+
+
+def test_photos_that_were_left_out_for_one_reason_are_one_sentence():
+    """By their names, since the scene does not number them; files of before have a sentence of each."""
+    names = ("0102.jpg", "0108.jpg", "0114.jpg")
+    said = ": too little of it could be matched with the other photos, so it is left out; take others"
+    record = Record(warnings=tuple(name + said for name in names))
+    assert told_warnings(record, 2) == (
+        "0102.jpg, 0108.jpg and 0114.jpg: too little of each could be matched with the other photos, so they "
+        "are left out; take others",
+    )
+
+
 @pytest.mark.parametrize("wrong", [None, "x", 3, [], [1.0], [True] * 4, ["a"] * 4, {"a": 1}])
 @pytest.mark.parametrize("name", list(FINE))
 def test_what_another_version_means_otherwise_is_left_out(name, wrong):

@@ -9,6 +9,7 @@ from langflash_core.base.files import check_folder, staged_folder
 from langflash_core.base.phrases import read_phrases
 from langflash_core.base.request import trim_phrases
 from langflash_core.errors import InputError
+from langflash_core.language.settings import ANSWERING
 
 from ..files import checked_scene
 from ..report import ProgressBar, say_warnings, tell
@@ -110,7 +111,8 @@ def _written(args: Namespace, result: "QueryResult") -> list[dict[str, str]]:
 
 
 def _line(entry: dict[str, Any], unit: str) -> str:
-    found = "found    " if entry["found"] else "not found"
+    near = ANSWERING.maybe_from(entry["threshold"]) <= entry["score"] < entry["threshold"]
+    found = "found    " if entry["found"] else "maybe    " if near else "not found"
     read = f" (read as: {entry['reading']})" if entry["reading"] else ""
     line = (
         f"{found}  {entry['prompt']}{read}: score {entry['score']:.3f} (threshold {entry['threshold']:.3f})"

@@ -8,6 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from langflash_core.geometry.poses import Vector
+from langflash_core.language.settings import ANSWERING
 from langflash_core.scene.mask import Mask
 
 # Told apart by people with the common colour-vision deficiencies, on dark ground.
@@ -75,7 +76,7 @@ class Prompt:
     @property
     def lowest(self) -> float:
         """The score from which a phrase may be there, below the threshold."""
-        return self.cut - (1 - MAYBE) * max(self.cut - EVEN, 0.0)
+        return ANSWERING.maybe_from(self.cut)
 
     @property
     def shown_from(self) -> float:
@@ -89,10 +90,6 @@ def free_colour(prompts: Sequence[Prompt]) -> tuple[float, float, float]:
     return next((colour for colour in PALETTE if colour not in used), PALETTE[len(prompts) % len(PALETTE)])
 
 
-EVEN = 0.5  # relevancy of what fits no better than what it is compared with
-MAYBE = 0.7
-"""Of the way from there to the threshold. In the shipped room, at a threshold of 0.85, things that are not
-there reach 0.70 (of 14: a toilet), a curtain 0.80 and a rug 0.83."""
 FIRST_PROMPT = Prompt(key=0)
 
 

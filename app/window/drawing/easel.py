@@ -74,6 +74,7 @@ class Easel:
         self._times_marked = 0
         self._painted: tuple | None = None  # all that the texture shows
         self._scored: tuple | None = None  # picture and question of the last view
+        self._chosen = 0  # the last question whose phrases chose among what answers their heads
 
     # --- what to show -----------------------------------------------------------------------
 
@@ -169,10 +170,13 @@ class Easel:
         self.texture = self.renderer.faded_texture() if faded else PAINTS[mode](self.renderer, wanted)
 
     def _mode(self, state: State, drawn: Drawn, asked: list[Prompt]) -> Picture:
-        """That is wanted, or colours where the picture, the question or the scene lack what it needs."""
+        """That is wanted, or colours where the picture, the question or the scene lack what it needs; also
+        until "red armchair" is told from every armchair."""
         if not drawn.plan.covers(replace(drawn.plan, kind=kind_of(state))):
             return pictures.RGB
-        if state.scene.mode.answers and (not asked or len(asked) != len(self.asked.keys)):
+        query = self.asked.query
+        unchosen = query is not None and query.narrows and self._chosen != self.asked.number
+        if state.scene.mode.answers and (not asked or len(asked) != len(self.asked.keys) or unchosen):
             return pictures.RGB
         return state.scene.mode if possible(state.scene.mode, state.scene.info) else pictures.RGB
 
@@ -239,7 +243,7 @@ class Easel:
         """Show this relevance (P, H, W), if the picture and the question of `View.name` are on show."""
         if name == self._scored:
             self.renderer.narrow(relevance)
-            self._painted = None
+            self._chosen, self._painted = self.asked.number, None
 
 
 def _place(camera: "Camera", x: int, y: int, depth: float) -> tuple[float, float, float]:

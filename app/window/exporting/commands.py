@@ -12,6 +12,12 @@ from ..scene import samples
 from ..state import State
 from .state import ExportForm, Running, Target
 
+_SAID_HERE = {
+    "lower --threshold": "lower its threshold",
+    "choose another --view": "look from where it is seen",
+}
+"""Of the command's words, the window's."""
+
 
 @dataclass(frozen=True)
 class EditForm:
@@ -131,7 +137,10 @@ class ExportEnded:
             return Notify("The export was stopped; nothing was written.", "info").apply(state)
         if self.code == 0:
             return Notify(f"Exported {self.said}", "info").apply(state)
-        return Notify(self.error or f"The export failed (code {self.code}).").apply(state)
+        said = self.error or f"The export failed (code {self.code})."
+        for there, here in _SAID_HERE.items():
+            said = said.replace(there, here)
+        return Notify(said).apply(state)
 
 
 @dataclass(frozen=True)

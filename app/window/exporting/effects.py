@@ -1,5 +1,6 @@
 """What exporting asks of the world: the files that the command reads, and the process that writes."""
 
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
@@ -42,6 +43,7 @@ class ExportingEffects(Effects):
         )
         self._waits = False  # for a copy
         self._ready: set[Path] = set()  # copies that are complete
+        self._camera: Path | None = None  # a file that the export under way alone is for
 
     def follow(self, command: Command, before: State, state: State) -> None:
         """The dialog has copies made, its button starts the process."""
@@ -61,12 +63,17 @@ class ExportingEffects(Effects):
                 self._export(state, sure)
             case CancelExport():
                 self._exporter.cancel()
+            case ExportEnded(code) if code:
+                self._leave_nothing()
             case _:
                 pass
 
     def close(self, state: State, crashed: bool) -> None:
         """End the export under way."""
+        running = self._exporter.running
         self._exporter.close()
+        if running:
+            self._leave_nothing()
 
     def _make_copies(self, state: State) -> None:
         """Write what the scene's own file does not hold: unsaved edits, and the selection."""
@@ -119,10 +126,19 @@ class ExportingEffects(Effects):
         LangFlashError: the folder or the camera file cannot be written.
         OSError: the process cannot be started.
         """
+        self._camera = None
         make_folder(wanted.request.output.parent)
         if wanted.camera_file is not None:
             size = pixels(state.exporting.form.side, shape(state))
             keys = state.keys if state.exporting.form.what.moves else ()
             content = keys_json(keys, *size) if keys else camera_json(state.scene.pose, *size)
+            if not wanted.camera_file.exists():
+                self._camera = wanted.camera_file
             write_atomically(wanted.camera_file, content)
         self._exporter.start(replace(wanted.request, replace=replaces).words())
+
+    def _leave_nothing(self) -> None:
+        """Of an export that wrote nothing: a camera file would be in the next one's way."""
+        if self._camera is not None:
+            with suppress(OSError):
+                self._camera.unlink()

@@ -27,6 +27,7 @@ from ..state import State
 from . import palette, table
 
 _HELP, _HANDS, _KEYS = 940.0, 208.0, 170.0  # design pixels of the help, and of its keys
+_MEASURED = 2  # frames until a dialog knows its height
 _COLUMN = 350.0  # of a column of two, at the least
 WIDTHS = {  # design pixels; others 520
     Dialog.EXPORT: export_panel.WIDTH,
@@ -74,6 +75,8 @@ def draw(state: State, look: Look) -> list[do.Command]:
     issued: list[do.Command] = []
     if opened:
         _keep_inside()
+        if imgui.is_window_appearing():  # a part that scrolls is measured a frame later
+            imgui.internal.get_current_window().hidden_frames_cannot_skip_items = _MEASURED
         issued = _body(state.dialog)(state, look)
         if not kept:
             issued.append(do.ShowDialog(None))

@@ -18,7 +18,7 @@ from PIL import Image
 
 import app.window
 import langflash_core
-from app.cli.commands import view
+from app.cli.commands import query, view
 from langflash_core.base.pictures import PICTURES
 from langflash_core.errors import ImageError
 from langflash_core.scene.file import load, save
@@ -82,6 +82,13 @@ def test_query_for_people(run, scene_file, tmp_path):
     assert second.startswith("not found") and "submarine" in second
     told = '"submarine" is no thing that this model was taught; it knows none that is near'
     assert outcome.err == f"warning: {told}\n"  # no bar, no other warning
+
+
+@pytest.mark.parametrize(("score", "said"), [(0.869, "maybe    "), (0.75, "not found"), (0.87, "not found")])
+def test_a_near_miss_is_called_maybe_as_in_the_window(score: float, said: str) -> None:
+    """At the threshold itself it is too small a part of the picture that is not found."""
+    entry = {"prompt": "plant", "reading": "", "found": False, "score": score, "threshold": 0.87, "files": {}}
+    assert query._line(entry, "scene") == f"{said}  plant: score {score:.3f} (threshold 0.870)"
 
 
 def test_what_another_photo_shows_is_said(run, tmp_path):

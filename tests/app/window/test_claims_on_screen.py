@@ -63,6 +63,18 @@ def test_a_warning_that_every_photo_and_the_scene_repeat_is_said_once() -> None:
     assert tray._sentences(state) == ["It is dark."]
 
 
+def test_notes_of_several_photos_are_one_sentence_until_the_scene_says_it() -> None:
+    state = shown_scene()
+    assert state.scene.info is not None
+    notes = {name: (f"{name} is very dark; take it again with more light",) for name in ("a.jpg", "b.jpg")}
+    photos = tuple(Photo(Path(name), notes=said) for name, said in notes.items())
+    joined = ["Photos 1 and 2 are very dark; take them again with more light."]
+    assert tray._sentences(state.with_scene(photos=photos, info=None)) == joined
+    made = state.scene.info.scene.with_record(photos=tuple(notes))
+    info = replace(state.scene.info, scene=made, warnings=("both are dark",))
+    assert tray._sentences(state.with_scene(photos=photos, info=info)) == ["Both are dark."]
+
+
 def drawn_over(state: State) -> list[float]:
     """How far to the right each vertex of what is marked in the picture stands."""
     with context((1280, 800)):

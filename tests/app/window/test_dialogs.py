@@ -24,7 +24,7 @@ from app.window.scene.drops import There, Typed
 from app.window.scene.state import Job
 from app.window.state import State
 from langflash_core.images.strip import Still, Strip
-from tests.app.window.headless import context
+from tests.app.window.headless import context, frames, look
 from tests.app.window.scenes import after
 from tests.app.window.test_small_windows import edited
 from tests.app.window.test_stumbles import Hands
@@ -153,3 +153,18 @@ def test_enter_waits_for_an_export_and_tab_leads_to_quitting_without_it() -> Non
 def test_enter_does_not_press_a_button_that_is_disabled() -> None:
     state = replace(opened(Dialog.LOAD_PROMPTS), typed=Typed(""))
     assert not any(isinstance(command, ask.LoadPrompts) for command in pressed(state, imgui.Key.enter))
+
+
+@pytest.mark.parametrize("size", [SIZE, (1280, 800)], ids=str)
+@pytest.mark.parametrize("dialog", Dialog)
+def test_a_dialog_comes_with_the_size_that_it_keeps(dialog: Dialog, size: tuple[int, int]) -> None:
+    """That of exports was a strip for one frame."""
+    state, shown = opened(dialog), []
+    with context(size):
+        theme.set_up(1.0, "dark")
+        for _ in range(8):
+            frames(lambda seen: dialogs.draw(state, seen), look(), 1)
+            window = imgui.internal.find_window_by_name(dialog.value)
+            if window is not None and not window.hidden:
+                shown.append((window.pos.x, window.pos.y, window.size.x, window.size.y))
+    assert len(shown) >= 4 and len(set(shown)) == 1

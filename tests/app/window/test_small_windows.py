@@ -320,3 +320,19 @@ def test_the_dictionary_has_room_for_its_groups_beside_a_narrow_picture(monkeypa
         frames(lambda seen: layout.draw_all(state, seen), look(), 6)
         _left, top, right, bottom = box("Dictionary")
     assert right <= 348 and bottom - top > 400
+
+
+def test_warnings_leave_room_for_the_field_of_phrases(monkeypatch, items: Items) -> None:
+    """Five of them stood above it, and what was typed chose tools."""
+    state = edited()
+    assert state.scene.info is not None
+    said = tuple(f"{number}: " + "what helps is to take more photos of the room, with more light. " * 2
+                 for number in range(5))  # fmt: skip
+    state = state.with_scene(info=replace(state.scene.info, warnings=said))
+    state = state.with_asking(prompts=(replace(state.asking.prompts[0], text=""),))
+    monkeypatch.setattr(layout.canvas, "draw", lambda state, look: [])  # needs OpenGL
+    with context((900, 560)):
+        theme.set_up(1.0, "dark")
+        frames(lambda seen: layout.draw_all(state, seen), look(), 8)
+        ((_, _, _, bottom),) = items.now()["##text"]
+    assert bottom < 560 - theme.STATUS_HEIGHT

@@ -405,6 +405,12 @@ def test_what_a_phrase_does_not_mean_leaves_the_picture_and_no_splat_is_drawn(vi
     if picture is CardPicture:
         viewport.picture = CardPicture(viewport._made(), 1, scene)
 
+    def shown() -> np.ndarray:
+        viewport.update(state, SIZE, touched=0.0)
+        pixels = viewport.seen()
+        assert pixels is not None
+        return pixels
+
     def seen(phrase: str) -> tuple[Narrowed | None, Answered, np.ndarray]:
         """The answer, and the picture once it is narrowed."""
         nonlocal state
@@ -423,13 +429,14 @@ def test_what_a_phrase_does_not_mean_leaves_the_picture_and_no_splat_is_drawn(vi
         told = [each for each in done if isinstance(each, Narrowed | Answered)]
         narrowed = next((each for each in told if isinstance(each, Narrowed)), None)
         if narrowed is not None:
+            assert np.array_equal(shown(), colours), "until then every armchair would light up under its name"
             viewport.narrow(narrowed.name, narrowed.relevance)
-        viewport.update(state, SIZE, touched=0.0)
-        pixels = viewport.seen()
-        assert pixels is not None
+        pixels = shown()
         return narrowed, next(each for each in told if isinstance(each, Answered)), pixels.astype(int)
 
     _, _, plain = seen("armchair")
+    heat, state = state, state.with_scene(mode=pictures.RGB)
+    colours, state = shown(), heat
     passes = dict(viewport.stats().passes)
     kept, _, red = seen("red armchair in front of the wall")
     gone, none, blue = seen("blue armchair")

@@ -10,6 +10,7 @@ from langflash_core.base.records import FoundLens
 from langflash_core.base.running import time_left
 from langflash_core.geometry.poses import FOV_RANGE
 from langflash_core.images.still_names import shown_name
+from langflash_core.scene.doubts import join_alike
 
 from ... import commands as do
 from ...kit import theme, widgets
@@ -23,6 +24,7 @@ from . import rooms, stages
 
 COLUMNS, MORE = 3, 5  # photos side by side; the second where there are over 12
 _CANCEL = 104.0  # design pixels
+WHOLE = 2  # warnings that leave room in a low window for the phrases' field
 NOTABLE_SECONDS = 0.05  # of a finished stage; a shorter one is only a heading of others
 HOW_TO_TELL = "click a photo to set it"
 WITHOUT_PHOTOS = "open the photos to set it"
@@ -41,8 +43,9 @@ def draw(state: State, look: Look) -> list[do.Command]:
     else:
         _hint(look)
     issued += _row(state, look)
-    short = bool(state.asking.asked) and not widgets.high(look)
-    for sentence in _sentences(state):
+    said = _sentences(state)
+    short = not widgets.high(look) and (bool(state.asking.asked) or len(said) > WHOLE)
+    for sentence in said:
         _warning(sentence, short)
     stages.draw(state, look)
     return issued
@@ -64,9 +67,12 @@ def _row(state: State, look: Look) -> list[do.Command]:
 
 
 def _sentences(state: State) -> list[str]:
-    """Each once: what the tray says of a photo, the scene made of it says again."""
+    """Each once: what is known of a photo, the scene made of it says."""
     said = [photo.problem for photo in state.scene.photos if photo.problem]
-    said += [note for photo in state.scene.photos for note in photo.notes]
+    names = [shown_name(photo.path.name) for photo in state.scene.photos]
+    made = state.scene.info.scene.record.photos if state.scene.info else ()
+    alone = [photo.notes for name, photo in zip(names, state.scene.photos, strict=True) if name not in made]
+    said += join_alike([note for notes in alone for note in notes], names)
     said += state.scene.info.warnings if state.scene.info else ()
     if state.scene.info is not None and len(state.scene.info.views) == 1 and state.scene.info.scene.photos:
         said.append(ONE_PHOTO)

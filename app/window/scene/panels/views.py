@@ -15,7 +15,6 @@ from .. import camera
 from . import in_space, places
 
 _VIEW = 54.0  # of a photo to jump to
-_SCROLLS = 8  # photos; more may be wider than the window
 _MARK = 7.5  # the radius of what marks a photo
 _BESIDE, _HIGHEST = 154.0, 62.0  # the switches' room at their right, and their height
 
@@ -26,10 +25,10 @@ def draw(state: State, look: Look) -> list[do.Command]:
     if state.scene.info is None:
         return issued
     height = look.px(_VIEW)
-    scrolls = len(state.scene.info.views) > _SCROLLS
     flags = imgui.WindowFlags_.no_scrollbar | imgui.WindowFlags_.no_scroll_with_mouse
+    room = imgui.get_main_viewport().size.x - imgui.get_window_pos().x - look.px(_BESIDE)
+    scrolls = _wide(len(state.scene.info.views), look) > room
     if scrolls:  # the switches stay in sight; the photos go by below the wheel
-        room = imgui.get_main_viewport().size.x - imgui.get_window_pos().x - look.px(_BESIDE)
         shape = imgui.ChildFlags_.nav_flattened | imgui.ChildFlags_.always_auto_resize
         shape |= imgui.ChildFlags_.auto_resize_x | imgui.ChildFlags_.auto_resize_y
         imgui.set_next_window_size_constraints(ImVec2(0, 0), ImVec2(max(room, height), look.px(_HIGHEST)))
@@ -67,6 +66,13 @@ def draw(state: State, look: Look) -> list[do.Command]:
         imgui.same_line(0, look.px(4))
         issued += places.draw(state, look, size)
     return issued
+
+
+def _wide(count: int, look: Look) -> float:
+    """Pixels of all photos side by side."""
+    pictures = (look.thumbnails.get(f"view {view}") for view in range(count))
+    wide = [round(look.px(_VIEW) * p[1]) + 2 * look.px(3) if p else look.px(_VIEW) for p in pictures]
+    return sum(wide) + (count - 1) * imgui.get_style().item_spacing.x
 
 
 def _mark(look: Look) -> None:

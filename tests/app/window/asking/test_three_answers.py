@@ -12,7 +12,7 @@ from app.window.asking import commands as ask
 from app.window.asking import things
 from app.window.asking.panels import prompts, scores
 from app.window.asking.panels.known import KNOWS
-from app.window.asking.state import BINS, EVEN, Histogram, Insight, Prompt
+from app.window.asking.state import BINS, Histogram, Insight, Prompt
 from app.window.asking.work import Encode
 from app.window.editing.pointing import AtomsNamed
 from app.window.editing.work import NameAtoms
@@ -26,6 +26,7 @@ from langflash_core.base.resources import asset_path
 from langflash_core.geometry.poses import Vector
 from langflash_core.language.answers import best_places
 from langflash_core.language.hints import reads_foreign
+from langflash_core.language.settings import ANSWERING
 from langflash_core.language.spaces import language_space
 from langflash_core.scene.edited import first_marks
 from langflash_core.scene.edits import History, delete
@@ -48,7 +49,7 @@ def test_a_near_miss_is_neither_found_nor_not(score: float, found: bool, maybe: 
 
 def test_what_fits_no_better_than_anything_is_never_maybe() -> None:
     for cut in (0.3, 0.5, 0.85, 1.0):
-        prompt = Prompt(0, "x", threshold=cut, score=min(EVEN, cut) - 0.01)
+        prompt = Prompt(0, "x", threshold=cut, score=min(ANSWERING.even, cut) - 0.01)
         assert not prompt.maybe and prompt.lowest <= cut
 
 

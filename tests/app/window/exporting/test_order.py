@@ -257,6 +257,27 @@ def test_it_is_asked_before_a_file_is_replaced(monkeypatch, folders: Path) -> No
     assert len(ran) == 2 and "--replace" in ran[1] and desk.state.dialog is None
 
 
+@pytest.mark.parametrize("by", ["end", "close"])
+def test_an_export_that_failed_leaves_no_camera_behind(monkeypatch, folders: Path, by: str) -> None:
+    """The next try asked whether to replace it."""
+    desk = Desk(form(scene(folders / "room.langflash"), path=str(folders / "a.png")), monkeypatch)
+    camera = folders / "a.camera.json"
+    for before in (None, "mine"):
+        if before:
+            camera.write_text(before)
+        desk.perform(export.Export(sure=True))
+        assert camera.exists()
+        if by == "close":
+            monkeypatch.setattr(Exporter, "running", True)
+            desk.effects.close(desk.state, crashed=False)
+            monkeypatch.setattr(Exporter, "running", False)
+        desk.perform(export.ExportEnded(2, "", "not found in this view: chair; lower --threshold"))
+        assert camera.exists() is bool(before)
+    assert [toast.text for toast in desk.state.toasts][
+        -1
+    ] == "not found in this view: chair; lower its threshold"
+
+
 def test_a_heat_map_is_exported_in_the_window_s_own_colours() -> None:
     state = form(scene(), what=outputs.HEAT, path="/out/heat")
     assert not {"--colormap", "--span"} & set(ordered(state).request.words())

@@ -1,5 +1,8 @@
 """The buttons of a scene's photos stay in the window, however many there are."""
 
+from dataclasses import replace
+from types import SimpleNamespace
+
 import pytest
 from imgui_bundle import ImVec2, imgui
 
@@ -10,12 +13,17 @@ from tests.app.window import headless
 from tests.app.window.scenes import VIEWS, shown_scene, with_info
 
 
-@pytest.mark.parametrize("count", (2, 9, 32))
-def test_the_switches_beside_the_photos_are_in_sight(count: int) -> None:
+@pytest.mark.parametrize("aspect", (None, 1.5), ids=["numbers", "pictures"])
+@pytest.mark.parametrize("count", (2, 5, 9, 32))
+def test_the_switches_beside_the_photos_are_in_sight(count: int, aspect: float | None) -> None:
+    """Five photos lengthwise pushed them over the edge."""
+    shown = None if aspect is None else (imgui.ImTextureRef(1), aspect)
+    thumbnails = SimpleNamespace(get=lambda name: shown if name.startswith("view") else None)
     state = with_info(shown_scene(), views=VIEWS[:1] * count)
     with headless.context((900, 600)):
         theme.set_up(1.0)
-        headless.frames(lambda look: layout.draw_all(state, look), headless.look())
+        look = replace(headless.look(), thumbnails=thumbnails)  # pyright: ignore[reportArgumentType]
+        headless.frames(lambda seen: layout.draw_all(state, seen), look, 6)
         left, top, right, bottom = headless.box("##views")
     assert left >= 0 and right <= 900 and bottom <= 600 and bottom - top <= 90
 
