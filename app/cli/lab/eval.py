@@ -14,6 +14,7 @@ from langflash_core.lab.evaluation.rooms.run import run_eval
 from langflash_core.lab.evaluation.tables import markdown
 from langflash_core.lab.photos import chosen_ids
 from langflash_core.lab.training.stages.stage import guided
+from langflash_core.language.leads import nearer_threshold
 from langflash_core.network import load_network
 
 from ..renderers import open_renderer
@@ -53,6 +54,7 @@ def run(args: Namespace, out: TextIO) -> None:
         "photos-labelled": _photos_labelled,
         "posed": _posed,
         "labels": labels,
+        "leads": _leads,
         "level": level,
         "moved": moved,
         "phrases": phrases,
@@ -95,6 +97,19 @@ def _photos_labelled(args: Namespace, out: TextIO) -> None:
             folder, ids, renderer, args.weights, preset=args.preset, size=args.size, progress=progress
         )
     write_tables(args, result, photos_markdown(result), out)
+
+
+def _leads(args: Namespace, out: TextIO) -> None:
+    check_output_file(args.output, (".safetensors",))
+    folder = opened_folder(args)
+    ids = chosen(args, folder)
+    from langflash_core.lab.evaluation.leads import learned_leads, write_leads
+
+    with ProgressBar() as progress, open_renderer(args.backend) as renderer:
+        leads = learned_leads(folder, ids, renderer, args.weights, progress=progress)
+    make_folder(args.output.parent)
+    write_leads(args.output, leads)
+    print(f"{args.output}: of {len(ids)} photos", file=out)
 
 
 def _grouping(args: Namespace, out: TextIO) -> None:
@@ -155,7 +170,7 @@ def _calibrate(args: Namespace, out: TextIO) -> None:
             )
     found = calibration(network, sets)
     if args.plot is not None:
-        _plot(args.plot, sets, found["threshold"])
+        _plot(args.plot, sets, nearer_threshold(found["threshold"], found["temperature"]))
     write_json({"calibration": found}, out)
 
 

@@ -98,6 +98,12 @@ def _add_labelled(actions) -> None:
     _add_folder(command)
     _add_choice(command, "photos, taken evenly (default: all)")
     _add_judging(command)
+    leads = new_command(actions, "leads", "what phrases of each kind start with, of labelled photos")
+    _add_folder(leads)
+    _add_choice(leads, "photos, taken evenly (default: all)")
+    leads.add_argument("--weights", type=Path, metavar="PATH", help="(default: the shipped ones)")
+    add_backend(leads)
+    add_output(leads, "FILE", "the .safetensors to write")
     grouping = new_command(
         actions,
         "grouping",
