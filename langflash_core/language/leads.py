@@ -29,10 +29,12 @@ FILE = "weights/minilm_leads.safetensors"
 
 @dataclass(frozen=True)
 class Leads:
-    """direction: one number where all phrases get the same."""
+    """direction: one number where all phrases get the same. reliability: rows (score, share of phrases
+    that scored so and were there), of photos kept aside; none: nobody measured it."""
 
     direction: Float[Tensor, " C"]
     offset: float
+    reliability: tuple[tuple[float, float], ...] = ()
 
     def of(self, phrases: Float[Tensor, "P C"]) -> Float[Tensor, " P"]:
         """Cosines (P,) that phrases of unit vectors (P, C) get."""
@@ -64,7 +66,8 @@ def read_leads(path: Path) -> Leads:
     """
     try:
         tensors = load_file(path)
-        return Leads(tensors["direction"].float(), float(tensors["offset"]))
+        rows = tensors.get("reliability", torch.zeros(0, 2)).tolist()
+        return Leads(tensors["direction"].float(), float(tensors["offset"]), tuple((s, p) for s, p in rows))
     except (OSError, SafetensorError, KeyError, ValueError, RuntimeError) as error:
         raise WeightsError(f"{path.name} is damaged ({error}); reinstall LangFlash") from error
 
