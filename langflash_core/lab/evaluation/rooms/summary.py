@@ -21,6 +21,7 @@ from langflash_core.lab.training.measures import (
     mean_iou,
     nan_mean,
 )
+from langflash_core.language.leads import nearer_threshold
 
 MEDIANS = ("depth_abs_rel", "depth_abs_rel_view_0_twice", "points_view_1")
 """Of these the median room is told beside the mean, which a few wrong poses dominate."""
@@ -29,7 +30,7 @@ MEDIANS = ("depth_abs_rel", "depth_abs_rel_view_0_twice", "points_view_1")
 def summary(tally: Tally, setting: Setting) -> dict:
     """Means, medians and tables of a run, rounded; plain JSON."""
     scores, truths = torch.cat(tally.scores), torch.cat(tally.truths)
-    found: Presence = presence(scores, truths, setting.threshold)
+    found: Presence = presence(scores, truths, nearer_threshold(setting.threshold, setting.temperature))
     always = presence(torch.ones_like(scores), truths, 0.5)
     overlapping = [error for error, overlap in tally.poses if overlap >= 0.3]
     rotations = torch.tensor([error.rotation for error, _ in tally.poses])

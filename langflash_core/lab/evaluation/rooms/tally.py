@@ -13,7 +13,6 @@ from langflash_core.lab.evaluation.metrics import (
 )
 from langflash_core.lab.evaluation.segments import Panoptic
 from langflash_core.lab.evaluation.words import OTHER, PAPER_LABELS
-from langflash_core.language.leads import nearer_threshold
 from langflash_core.language.spaces import LanguageSpace, language_space
 from langflash_core.network import LangFlashNet
 
@@ -67,7 +66,6 @@ class Setting:
     ) -> "Setting":
         space = language_space(network.preset.space)
         own = network.calibration
-        temperature = float(own.get("temperature", space.temperature))
         with torch.no_grad():
             return Setting(
                 network=network,
@@ -76,8 +74,8 @@ class Setting:
                 texts=space.encode(list(groups)),
                 paper_texts=space.encode(list(PAPER_LABELS[:OTHER])),
                 median_depth=median_depth,
-                temperature=temperature,
-                threshold=nearer_threshold(float(own.get("threshold", space.threshold)), temperature),
+                temperature=float(own.get("temperature", space.temperature)),
+                threshold=float(own.get("threshold", space.threshold)),
                 negatives=space.encode(list(own.get("negatives", space.negatives))),
                 lpips=lpips,
             )
