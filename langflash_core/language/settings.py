@@ -184,8 +184,8 @@ class Rivals:
     lead: float = 0.09
     """Cosine that a phrase gets which nothing beats, as a mean over words (`language.leads`)."""
     nearer: float = 0.06
-    """Cosine by which a score may be lower than the calibration's, which knew weaker rivals: on photos never
-    seen as many answers are right as were, and on walks more is found."""
+    """Cosine by which a score may be lower than the calibration's, which knew weaker rivals: with less fewer
+    things are found, with more other things answer (MEASURED.md)."""
 
 
 RIVALS = Rivals()
