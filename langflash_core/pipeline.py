@@ -314,6 +314,8 @@ def _page_phrases(
     limit = compiled.threshold if threshold is None else threshold
     check_threshold(limit)
     atoms = compiled.factor  # of which D = atoms Q: products with phrases are the same
+    leads, dictionary = space.leads(), finite_dictionary(scene, space)
+    met = dictionary + dictionary.norm(dim=-1, keepdim=True) * leads.direction.to(dictionary)
     return Phrases(
         texts=compiled.texts,
         num_asked=num_asked,
@@ -322,8 +324,9 @@ def _page_phrases(
         gram=atoms @ atoms.T,
         temperature=compiled.temperature,
         threshold=limit,
-        dictionary=finite_dictionary(scene, space) if with_text else None,
+        dictionary=met if with_text else None,
         rivals=encode_cached(space, space.rivals) if with_text else None,
+        lead=leads.offset,
     )
 
 

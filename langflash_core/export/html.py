@@ -72,8 +72,9 @@ class Phrases:
 
     texts: P phrases, the first `num_asked` of them shown at once. scores (P, K): d_k . t.
     negatives (M, K): d_k . n of what a phrase is compared with. gram (K, K): d_j . d_k.
-    temperature, threshold: as of a query in mode relevancy. dictionary (K, C): d_k, and rivals (V, C): names
-    that others are measured against, where phrases are to be answered that are not among the texts.
+    temperature, threshold: as of a query in mode relevancy. dictionary (K, C): d_k + |d_k| a, and rivals (V,
+    C): names that others are measured against, where phrases t are to be answered that are not among the
+    texts; they start with lead + a . t.
     """
 
     texts: tuple[str, ...]
@@ -85,6 +86,7 @@ class Phrases:
     threshold: float
     dictionary: Tensor | None = None
     rivals: Tensor | None = None
+    lead: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -228,6 +230,7 @@ def _encode(scene: Scene, phrases: Phrases | None) -> tuple[dict, bytes]:
         header["phrases"] = {
             "texts": list(phrases.texts), "asked": phrases.num_asked, "atoms": len(phrases.gram),
             "temperature": phrases.temperature, "threshold": phrases.threshold,
+            "lead": phrases.lead,
         }  # fmt: skip
         columns += weight_columns(held)
         tables = {

@@ -11,7 +11,7 @@ others, and Q t + x is held.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Literal, get_args
 
 import torch
@@ -22,6 +22,7 @@ from langflash_core.errors import PromptError, SceneFileError
 from langflash_core.language.algebra import encode_prompts
 from langflash_core.language.grammar import Reading
 from langflash_core.language.hints import hints
+from langflash_core.language.leads import nearer_threshold
 from langflash_core.language.rivals import alike, rivalry
 from langflash_core.language.settings import RELEVANCE, RIVALS
 from langflash_core.language.spaces import LanguageSpace, encode_cached
@@ -102,7 +103,8 @@ def finite_dictionary(scene: Scene | Semantics, space: LanguageSpace) -> Float[T
 
 
 def calibration_of(scene: Scene | None, space: LanguageSpace) -> Calibration:
-    """The scene's own calibration (`Record.calibration`) over the defaults of its space.
+    """The scene's own calibration (`Record.calibration`) over the defaults of its space, its threshold as far
+    lower as rivals and leads ask (`Rivals.nearer`).
 
     Raises:
         SceneFileError: the scene's calibration is not usable.
@@ -119,7 +121,9 @@ def calibration_of(scene: Scene | None, space: LanguageSpace) -> Calibration:
         raise SceneFileError(f"the scene's calibration is damaged ({error}); make it again") from error
     if not (chosen.temperature > 0 and 0 <= chosen.threshold <= 1 and -1 <= chosen.cosine_threshold <= 1):
         raise SceneFileError(f"the scene's calibration is out of range ({chosen}); make it again")
-    return chosen
+    if not space.rivals:
+        return chosen
+    return replace(chosen, threshold=nearer_threshold(chosen.threshold, chosen.temperature))
 
 
 def compile_query(
@@ -181,7 +185,7 @@ def rival_terms(
     names = encode_cached(space, space.rivals).to(dictionary)
     kin = alike(texts, space.rivals) | apart(texts, space, phrases.cpu())
     return dictionary.norm(dim=-1, keepdim=True) * rivalry(
-        dictionary, phrases, names, kin.to(dictionary.device)
+        dictionary, phrases, names, kin.to(dictionary.device), space.leads()
     )
 
 

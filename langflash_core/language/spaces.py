@@ -10,6 +10,7 @@ from torch import Tensor
 
 from langflash_core.errors import PromptError
 from langflash_core.language import clip, minilm
+from langflash_core.language.leads import ALL_THE_SAME, Leads, shipped_leads
 from langflash_core.language.vocabulary import OWN
 from langflash_core.types import NO_LANGUAGE
 
@@ -31,7 +32,8 @@ class LanguageSpace:
     that a present thing must beat. threshold: relevancy in (0, 1) from which a phrase counts as
     present; cosine_threshold: the same for `cosine`, in [-1, 1]. A trained network's own
     calibration, kept in the scene, goes before these defaults. load: gives the tower. rivals: names that
-    take from a phrase what fits them better (`rivals.py`); none: it stands for itself.
+    take from a phrase what fits them better (`rivals.py`); none: it stands for itself. leads: gives
+    what phrases start with beside rivals (`leads.py`).
     """
 
     name: str
@@ -42,6 +44,7 @@ class LanguageSpace:
     load: Callable[[], TextTower] = field(repr=False)
     negatives: tuple[str, ...] = NEGATIVES
     rivals: tuple[str, ...] = ()
+    leads: Callable[[], Leads] = field(default=lambda: ALL_THE_SAME, repr=False)
 
     def encode(self, texts: Sequence[str]) -> Float[Tensor, "P C"]:
         """Unit embeddings (P, C) float32; the tower is read at the first call.
@@ -72,6 +75,7 @@ _MINILM = LanguageSpace(
     cosine_threshold=0.5,
     load=minilm.load_minilm,
     rivals=tuple(OWN),
+    leads=shipped_leads,
 )
 # Temperature and the border of relevancy as LERF has them; cosines of LSeg features with their
 # own label lie around 0.2 to 0.3. Not calibrated here, for lack of CLIP weights.

@@ -16,6 +16,7 @@ from langflash_core.export import export
 from langflash_core.export.html import LAYERED, READING, SCRIPTS, Phrases, write_html
 from langflash_core.export.settings import COLUMNS
 from langflash_core.geometry.poses import Pose, Vector, from_view
+from langflash_core.language.leads import shipped_leads
 from langflash_core.language.relevance import compile_query
 from langflash_core.language.settings import ANSWERING, RELEVANCE
 from langflash_core.language.spaces import language_space
@@ -172,7 +173,10 @@ def test_bad_questions_are_one_sentence(tmp_path, spoken_room, few):
 def test_a_page_takes_the_text_model_along(tmp_path, spoken_room, few):
     pipeline.web_page(spoken_room, tmp_path / "a.html", with_text=True)
     page = read_page(tmp_path / "a.html")
-    assert np.allclose(page.dictionary(), spoken_room.semantics.dictionary.numpy(), atol=1e-4)
+    atoms, leads = spoken_room.semantics.dictionary, shipped_leads()
+    met = atoms + atoms.norm(dim=-1, keepdim=True) * leads.direction
+    assert np.allclose(page.dictionary(), met.numpy(), atol=1e-4)
+    assert page.header["phrases"]["lead"] == leads.offset
     assert page.scripts["tower"] == asset_path("weights/minilm_l6_v2_rowint8.safetensors").read_bytes()
     tokens = page.scripts["tokens"].decode().split("\n")
     assert len(tokens) == 30522 and tokens.index("[SEP]") == 102

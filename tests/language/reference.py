@@ -79,13 +79,16 @@ def softmax_relevancy(positives: Tensor, negatives: Tensor, temperature: float) 
 def beaten_twin(
     atom: NDArray[np.float64], phrase: NDArray[np.float64], names: NDArray[np.float64], constants: tuple
 ) -> float:
-    """What rivals add to one atom's cosine with a phrase, name by name; constants: kin, behind, lead."""
-    kin, behind, lead = constants
+    """What rivals add to one atom's cosine with a phrase, name by name; constants: kin, behind, and of leads
+    the offset and the direction."""
+    kin, behind, offset, direction = constants
     length = math.sqrt(math.fsum(atom**2))
     if length == 0:
         return 0.0
-    ahead = 0.0
+    lead = offset + math.fsum(direction * phrase)
+    own, ahead = math.fsum(atom * phrase) / length + lead, 0.0
     for name in names:
         if math.fsum(phrase * name) <= kin:
-            ahead = max(ahead, math.fsum(atom * name) / length - math.fsum(atom * phrase) / length)
+            other = math.fsum(atom * name) / length + offset + math.fsum(direction * name)
+            ahead = max(ahead, other - own)
     return lead - behind * ahead

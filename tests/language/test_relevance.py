@@ -8,6 +8,7 @@ import torch
 from torch.nn.functional import normalize
 
 from langflash_core.errors import PromptError, SceneFileError
+from langflash_core.language.leads import nearer_threshold
 from langflash_core.language.relevance import (
     CompiledQuery,
     Mode,
@@ -252,7 +253,11 @@ def test_negatives_can_be_given(semantics):
 def test_the_scenes_calibration_goes_first(semantics):
     own = {"temperature": 25, "threshold": 0.65, "negatives": ["wall"], "cosine_threshold": 0.3}
     query = compile_query(scene_of(semantics, calibration=own), language_space(), ["couch"])
-    assert (query.temperature, query.threshold, query.negative_texts) == (25.0, 0.65, ("wall",))
+    assert (query.temperature, query.threshold, query.negative_texts) == (
+        25.0,
+        nearer_threshold(0.65, 25.0),
+        ("wall",),
+    )
     query = compile_query(scene_of(semantics, calibration=own), language_space(), ["couch"], mode="cosine")
     assert query.threshold == 0.3
     assert compile_query(scene_of(semantics), language_space(), ["couch"]).temperature == 10.0

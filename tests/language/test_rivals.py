@@ -6,6 +6,7 @@ import pytest
 import torch
 from torch.nn.functional import normalize
 
+from langflash_core.language.leads import Leads, shipped_leads
 from langflash_core.language.relevance import (
     apart,
     compile_query,
@@ -25,6 +26,10 @@ def drawn(count, channels, seed):
     return normalize(values, dim=-1)
 
 
+def lead_of(word):
+    return shipped_leads().of(language_space().encode([word])).item()
+
+
 def semantics_of(dictionary):
     count = len(dictionary)
     return Semantics(torch.arange(count)[:, None], torch.ones(count, 1), dictionary, "minilm")
@@ -33,18 +38,16 @@ def semantics_of(dictionary):
 def test_rivalry_is_its_twin():
     atoms, phrases, names = 1.7 * drawn(7, 4, 1), drawn(5, 4, 2), drawn(9, 4, 3)
     atoms[3] = 0
-    found = rivalry(atoms, phrases, names)
-    expected = [
-        [
-            beaten_twin(d.numpy(), t.numpy(), names.numpy(), (RIVALS.kin, RIVALS.behind, RIVALS.lead))
-            for t in phrases
-        ]
-        for d in atoms
-    ]
+    leads = Leads(0.3 * drawn(1, 4, 4)[0], 0.07)
+    found = rivalry(atoms, phrases, names, leads=leads)
+    constants = (RIVALS.kin, RIVALS.behind, leads.offset, leads.direction.numpy())
+    expected = [[beaten_twin(d.numpy(), t.numpy(), names.numpy(), constants) for t in phrases] for d in atoms]
     # Sums of four products near 1, of float64: a few of its steps of 2.2e-16.
     assert torch.allclose(found, torch.tensor(expected, dtype=torch.float64), rtol=0, atol=1e-14)
     assert (phrases @ names.T > RIVALS.kin).any(), "some name is kin"
-    assert (found[3] == 0).all() and (found.amax() == RIVALS.lead) and (found.amin() < 0)
+    assert (found[3] == 0).all() and (found.amin() < 0)
+    alone = rivalry(atoms, phrases, names)
+    assert alone.amax() == RIVALS.lead and not torch.allclose(alone, found)
 
 
 @pytest.mark.parametrize("repeated", [False, True])
@@ -91,7 +94,7 @@ def test_names_of_the_same_thing_are_no_rivals():
     added = rival_terms(
         picture, replace(space, rivals=("picture",)), ["painting"], space.encode(["painting"])
     )
-    assert added.item() == pytest.approx(RIVALS.lead)
+    assert added.item() == pytest.approx(lead_of("painting"))
     assert (
         rival_terms(wall, replace(space, rivals=("wall",)), ["painting"], space.encode(["painting"])).item()
         < 0
@@ -105,7 +108,7 @@ def test_a_name_written_apart_is_the_name():
         [True, True], [False, False], [False, False], [False, False],
     ]  # fmt: skip
     wall, stand = space.encode(["wall", "night stand"]).split(1)
-    assert rival_terms(wall, space, ["night stand"], stand).item() == pytest.approx(RIVALS.lead)
+    assert rival_terms(wall, space, ["night stand"], stand).item() == pytest.approx(lead_of("night stand"))
 
 
 def test_nothing_has_no_rivals():

@@ -36,6 +36,7 @@ def run(args: Namespace, out: TextIO) -> None:
         "photos-labelled": scenes.photos_labelled,
         "posed": scenes.posed,
         "labels": labels,
+        "leads": scenes.leads,
         "level": rooms.level,
         "moved": rooms.moved,
         "phrases": phrases,

@@ -1,6 +1,6 @@
 """What a score means: how many phrases that scored so were there, on photos kept aside for it."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -23,9 +23,17 @@ class Reliability:
         return float(np.interp(score, self.scores, self.present))
 
 
-def reliability(calibration: Mapping[str, Any]) -> Reliability | None:
-    """Of a scene's calibration, which its network brought; None where nobody measured it."""
+def reliability(
+    calibration: Mapping[str, Any], newer: Sequence[tuple[float, float]] = ()
+) -> Reliability | None:
+    """Of a scene's calibration, which its network brought; None where nobody measured it.
+
+    Args:
+        newer: scores and shares of photos that go before the calibration's own (`Leads.reliability`).
+    """
     sets = calibration.get("reliability")
+    if sets and newer:
+        sets = {"photos": [{"score": score, "present": present} for score, present in newer]}
     for name, on in _SETS:
         try:
             pairs = sorted((float(row["score"]), float(row["present"])) for row in sets[name])  # type: ignore[index]

@@ -7,8 +7,7 @@ const TOP_FRACTION = 0.001; // of the covered pixels: their mean is the score
 const MIN_AREA = 0.0005; // of all pixels: a smaller mask is noise
 const BINS = 4096;
 const KIN = 0.6; // cosine of names that mean the same
-const BEHIND = 0.4; // of how much a phrase is behind the best other name, what it loses
-const LEAD = 0.09; // what one gets that nothing beats
+const BEHIND = 0.8; // of how much a phrase is behind the best other name, what it loses
 
 // rows of a flat table (rows, C) times a vector (C,).
 function products(table, vector) {
@@ -18,8 +17,8 @@ function products(table, vector) {
 }
 
 class Answers {
-  // phrases: of readPhrases: P scores and M negatives of K numbers each; gram (K, K), dictionary (K, C) and
-  // rivals (V, C), flat.
+  // phrases: of readPhrases: P scores and M negatives of K numbers each; gram (K, K), dictionary (K, C) as
+  // phrases meet it, and rivals (V, C), flat; lead: what one gets that nothing beats.
   constructor(phrases, count) {
     Object.assign(this, phrases);
     this.count = count;
@@ -38,9 +37,9 @@ class Answers {
       const length = Math.sqrt(this.gram[atom * (this.atoms + 1)]);
       const best = this.named(atom, vector.length).reduce(
         (most, value, name) => (kin[name] ? most : Math.max(most, value)),
-        -length,
+        -Infinity,
       );
-      return score + LEAD * length - BEHIND * Math.max(0, best - score);
+      return score + this.lead * length - BEHIND * Math.max(0, best - score);
     });
     this.scores.push(scores);
     return this.texts.push(text) - 1;

@@ -24,6 +24,7 @@ from langflash_core.lab.evaluation.metrics import Presence, presence
 from langflash_core.lab.evaluation.rooms.phrases import MASK_THRESHOLDS
 from langflash_core.lab.evaluation.rooms.run import asked_rooms
 from langflash_core.lab.photos import PhotoFolder
+from langflash_core.language.leads import nearer_threshold
 from langflash_core.language.spaces import language_space
 from langflash_core.network import LangFlashNet
 
@@ -110,9 +111,10 @@ def calibration(network: LangFlashNet, sets: dict[str, Asked]) -> dict:
     space = language_space(network.preset.space)
     best = best_threshold(sets)
     crossed = {name: _crossed(sets, name) for name in sets}
+    temperature = float(network.calibration.get("temperature", space.temperature))
     return {
-        "temperature": float(network.calibration.get("temperature", space.temperature)),
-        "threshold": MASK_THRESHOLDS[best],
+        "temperature": temperature,
+        "threshold": nearer_threshold(MASK_THRESHOLDS[best], -temperature),  # as `calibration_of` reads it
         "negatives": list(network.calibration.get("negatives", space.negatives)),
         "validation": {name: _validation(asked, best, crossed[name]) for name, asked in sets.items()},
         "reliability": {name: reliability(asked) for name, asked in sets.items()},

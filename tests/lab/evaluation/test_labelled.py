@@ -6,12 +6,15 @@ from pathlib import Path
 import pytest
 import torch
 
+from langflash_core.errors import InputError
 from langflash_core.lab.evaluation import bench, labelled
 from langflash_core.lab.evaluation.bench import Bench
+from langflash_core.lab.evaluation.leads import learned_leads
 from langflash_core.lab.evaluation.photo_words import PhotoWords, absent_rows, paper_row, photos_of_names
 from langflash_core.lab.evaluation.tables import markdown
 from langflash_core.lab.evaluation.words import PAPER_LABELS
 from langflash_core.lab.photos import Name, PhotoFolder
+from langflash_core.language.settings import RIVALS
 from langflash_core.language.spaces import language_space
 from langflash_core.network import MINI
 from langflash_core.splat import render
@@ -158,3 +161,12 @@ def test_what_is_absent_means_something_else():
     # "book" is there, a couch is a sofa, a sofa is a seat.
     assert {asked[row] for row in rows} == {"bookcase", "chair", "garden gnome"}
     assert len(absent_rows(["books"], asked, vectors, 1, generator)) == 1
+
+
+def test_leads_are_learned_of_what_some_photos_show_and_others_do_not(folder: PhotoFolder, program):
+    """Of these the lamp alone, and one border tells nothing of other words."""
+    leads = learned_leads(folder, folder.ids[2:5], Bench(render))
+    told = leads.of(language_space().encode(["wall", "lamp"]))
+    assert told.tolist() == pytest.approx([RIVALS.lead] * 2)
+    with pytest.raises(InputError, match="give more labelled photos"):
+        learned_leads(folder, [folder.ids[4]], Bench(render))  # it shows everything that may be asked

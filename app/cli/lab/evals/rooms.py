@@ -22,6 +22,7 @@ from langflash_core.lab.evaluation.tables import markdown
 from langflash_core.lab.photos import chosen_ids
 from langflash_core.lab.rooms import Pack, load_pack
 from langflash_core.lab.training.cache import HELD_OUT_SEED
+from langflash_core.language.leads import nearer_threshold
 from langflash_core.network import load_network
 
 from ...renderers import open_renderer
@@ -92,7 +93,7 @@ def calibrate(args: Namespace, out: TextIO) -> None:
             sets["photos"] = photos_asked(folder, ids, bench, progress)
     found = calibration(network, sets)
     if args.plot is not None:
-        _plot(args.plot, sets, found["threshold"])
+        _plot(args.plot, sets, nearer_threshold(found["threshold"], found["temperature"]))
     write_json({"calibration": found}, out)
 
 

@@ -233,6 +233,20 @@ def photos_labelled(args: Namespace, out: TextIO) -> None:
     write_tables(args, result, markdown(tables(result)), out)
 
 
+def leads(args: Namespace, out: TextIO) -> None:
+    """Learn what phrases of each kind start with, from labelled photos."""
+    check_output_file(args.output, (".safetensors",))
+    folder = opened_folder(args)
+    ids = chosen(args, folder)
+    from langflash_core.lab.evaluation.leads import learned_leads, write_leads
+
+    with opened(args, Bench, words=True) as (bench, progress):
+        found = learned_leads(folder, ids, bench, progress=progress)
+    make_folder(args.output.parent)
+    write_leads(args.output, found)
+    print(f"{args.output}: of {len(ids)} photos", file=out)
+
+
 def grouping(args: Namespace, out: TextIO) -> None:
     """Judge groups and parts of single real photos against what was named or outlined in them."""
     check_files(args)

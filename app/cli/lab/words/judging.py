@@ -94,6 +94,13 @@ def _add_labelled(actions) -> None:
     add_folder(command, LAYOUT)
     _add_choice(command, "photos, taken evenly (default: all)")
     add_judging(command)
+    leads = new_command(actions, "leads", "what phrases of each kind start with, of labelled photos")
+    add_folder(leads, LAYOUT)
+    _add_choice(leads, "photos, taken evenly (default: all)")
+    add_path(leads, "--weights", "PATH", "(default: the shipped ones)")
+    add_backend(leads)
+    add_output(leads, "FILE", "the .safetensors to write")
+    leads.set_defaults(preset="mini")
     grouping = new_command(
         actions,
         "grouping",

@@ -1,5 +1,7 @@
 """How the pixels of the view score for the active phrase, with its threshold as a line to drag."""
 
+from typing import TYPE_CHECKING
+
 import numpy as np
 from imgui_bundle import ImVec2, imgui, implot
 from imgui_bundle import icons_fontawesome_6 as fa
@@ -11,6 +13,9 @@ from ...state import State
 from .. import commands as ask
 from ..reliability import Reliability, reliability
 from ..state import BINS, Prompt
+
+if TYPE_CHECKING:
+    from langflash_core.types import Scene
 
 _HEIGHT = 78.0  # design pixels
 _PLOT = implot.Flags_.canvas_only | implot.Flags_.no_frame
@@ -30,13 +35,19 @@ def draw(state: State, look: Look) -> list[do.Command]:
     title = widgets.shortened(f"Scores of {prompt.text.strip()}", room)
     if not widgets.section(f"{title}###scores"):
         return []
-    known = None if state.scene.info is None else reliability(state.scene.info.scene.record.calibration)
+    known = None if state.scene.info is None else _known(state.scene.info.scene)
     issued = _plot(prompt, np.array(found.counts, float), known, look)
     if known is not None and prompt.score is not None and not prompt.otherwise:
         share = 100 * known.at(prompt.score)
         score = f"{prompt.score:.2f}"
         widgets.muted(f"On {known.on}, a score of {score} is right {share:.0f} % of the time.")
     return issued + _span(state, prompt, look)
+
+
+def _known(scene: "Scene") -> Reliability | None:
+    from langflash_core.language.spaces import language_space
+
+    return reliability(scene.record.calibration, language_space(scene.semantics.space).leads().reliability)
 
 
 def _span(state: State, prompt: Prompt, look: Look) -> list[do.Command]:

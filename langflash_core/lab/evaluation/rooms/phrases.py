@@ -67,7 +67,7 @@ def note_paraphrases(setting: Setting, maps: Tensor, truth: Tensor, tally: Tally
     """IoU of other words with all they are true of, and of the plain names of the same things.
 
     The names' mask is the union of the masks of all those names that are well in sight: what
-    somebody would get who typed them one by one. Same pixels, same threshold.
+    somebody would get who typed them one by one. Same pixels, same threshold, no rivals.
 
     Args:
         maps: (H, W, C). truth: (H*W,) row of each pixel's class group, -1 for none.

@@ -9,6 +9,7 @@ from langflash_core.lab.evaluation.tables import Table, labels_table, measures_t
 from langflash_core.lab.evaluation.words import PAPER_LABELS
 from langflash_core.lab.training.measures import accuracy as pixel_accuracy
 from langflash_core.lab.training.measures import class_ious, mean_iou, nan_mean
+from langflash_core.language.leads import nearer_threshold
 
 MEASURES = (
     ("Depth AbsRel, view 1", "depth_abs_rel", "constant depth", "depth_abs_rel_constant"),
@@ -75,6 +76,7 @@ MEDIANS = ("depth_abs_rel", "depth_abs_rel_view_0_twice", "points_view_1")
 def summary(tally: Tally, setting: Setting) -> dict:
     """Means, medians and tables of a run, rounded; plain JSON."""
     scores, truths = torch.cat(tally.scores), torch.cat(tally.truths)
+    found = presence(scores, truths, nearer_threshold(setting.threshold, setting.temperature))
     always = presence(torch.ones_like(scores), truths, 0.5)
     overlapping = [error for error, overlap in tally.poses if overlap >= 0.3]
     geometry = {
@@ -86,7 +88,7 @@ def summary(tally: Tally, setting: Setting) -> dict:
         "panoptic_quality": tally.panoptic.mean(),
         "panoptic_segmentation": tally.panoptic.mean("segmentation"),
         "panoptic_recognition": tally.panoptic.mean("recognition"),
-        **presence_measures(presence(scores, truths, setting.threshold), scores, truths),
+        **presence_measures(found, scores, truths),
         "presence_f1_always_found": always.f1,
         "presence_phrases": float(len(scores)),
     }
