@@ -260,7 +260,9 @@ def test_it_is_asked_before_a_file_is_replaced(monkeypatch, folders: Path) -> No
 @pytest.mark.parametrize("by", ["end", "close"])
 def test_an_export_that_failed_leaves_no_camera_behind(monkeypatch, folders: Path, by: str) -> None:
     """The next try asked whether to replace it."""
-    desk = Desk(form(scene(folders / "room.langflash"), path=str(folders / "a.png")), monkeypatch)
+    monkeypatch.setattr(Exporter, "start", lambda *_: None)
+    state = form(scene(folders / "room.langflash"), path=str(folders / "a.png"))
+    desk = Desk(state, lambda hands, _world: ExportingEffects(hands, Keeper()))
     camera = folders / "a.camera.json"
     for before in (None, "mine"):
         if before:
@@ -269,7 +271,7 @@ def test_an_export_that_failed_leaves_no_camera_behind(monkeypatch, folders: Pat
         assert camera.exists()
         if by == "close":
             monkeypatch.setattr(Exporter, "running", True)
-            desk.effects.close(desk.state, crashed=False)
+            desk.effects[0].close(desk.state, crashed=False)
             monkeypatch.setattr(Exporter, "running", False)
         desk.perform(export.ExportEnded(2, "", "not found in this view: chair; lower --threshold"))
         assert camera.exists() is bool(before)
