@@ -167,10 +167,10 @@ def _on_planes(
 def _choose_planes(
     view: _View, found: Sequence[Plane]
 ) -> tuple[Integer[np.ndarray, "H W"], Float[np.ndarray, "H W"]]:
-    """The plane that each pixel of the hole shows, -1 for none, and its depth there."""
+    """The plane that each pixel of the hole shows, -1 for none, and its depth there, 0 for none."""
     which, depth = np.full(view.hole.shape, -1), np.full(view.hole.shape, np.inf)
     if not found or not view.ring.any():
-        return which, depth
+        return which, np.zeros_like(depth)
     points = view.points(view.depths)
     apart = np.stack([abs(plane.apart(points)) for plane in found])  # (p, H, W)
     label = np.where(view.ring & (apart.min(0) <= 2 * FILLING.far * view.depths), apart.argmin(0), -1)
@@ -188,7 +188,7 @@ def _choose_planes(
         # a curtain's, just before its wall's
         there &= (which < 0) | ~alike[which] | (hit < FILLING.close * depth)
         which[there], depth[there] = number, hit[there]
-    return which, depth
+    return which, np.where(which < 0, 0.0, depth)
 
 
 def _patch(plane: Plane, spots: Float[np.ndarray, "n 3"], views: Sequence[_View], none: Scene) -> Scene:

@@ -240,8 +240,11 @@ class Easel:
         return Numbers(renderer.frame(), renderer.relevance(), others)
 
     def narrow(self, name: tuple, relevance: "Tensor") -> None:
-        """Show this relevance (P, H, W), if the picture and the question of `View.name` are on show."""
-        if name == self._scored:
+        """Show this relevance (P, H, W), if the picture and the question of `View.name` are on show; if another
+        picture came meanwhile, the next that rests is scored again."""
+        if name == self._scored and name[0] != self.drawn:
+            self._scored = None
+        elif name == self._scored:
             self.renderer.narrow(relevance)
             self._chosen, self._painted = self.asked.number, None
 
