@@ -16,6 +16,7 @@ from app.window.asking.work import Answer
 from app.window.drawing.card import CardPicture
 from app.window.drawing.processor import ProcessorPicture
 from app.window.drawing.stills import RETRY_SECONDS
+from app.window.drawing.values import View
 from app.window.governor import Governor, Kind, Plan
 from app.window.scene import commands as show
 from app.window.scene.commands import SceneArrived
@@ -448,3 +449,25 @@ def test_what_a_phrase_does_not_mean_leaves_the_picture_and_no_splat_is_drawn(vi
     after = dict(viewport.stats().passes)
     splatted = ("colour", "weights")
     assert [after.get(kind) for kind in splatted] == [passes.get(kind) for kind in splatted]
+
+
+def test_an_answer_that_comes_behind_its_picture_is_asked_for_again(viewport) -> None:
+    """The window closed: a smaller picture, of a hand that moves, was to be painted by the one before."""
+    scene = spoken_room()
+    state = showing(scene, mode=pictures.HEAT)
+    viewport.set_scene(1, scene)
+    query = compile_spoken(scene, language_space("minilm"), ["red armchair"])
+    viewport.ask((state.asking.prompts[0].key,), query, state.asking.revision)
+
+    def rested() -> View:
+        for frame in living(viewport, state, count=600):
+            view = viewport.view(frame)
+            if view is not None and viewport.whole and not viewport.settling:
+                return view
+        raise AssertionError("it never rests")
+
+    first = rested()
+    viewport.update(state, (SIZE[0] // 2, SIZE[1] // 2), touched=0.0)
+    viewport.narrow(first.name, first.relevance)
+    second = rested()
+    assert second.name == first.name and second.relevance.shape == first.relevance.shape
