@@ -150,8 +150,11 @@ def measure_gaussians(scene: Scene, name: str) -> Float[np.ndarray, " N"]:
 
 def _describe_rule(rule: Rule) -> str:
     """A rule for people."""
-    parts = ["colour"] * (COLOUR in rule)
+    parts = []
     for name, limits in rule.items():
-        bounds = zip("><", limits, strict=True) if name != COLOUR else ()
+        if name == COLOUR:
+            parts.append(name)
+            continue
+        bounds = zip("><", limits, strict=True)
         parts += [f"{name} {sign} {limit:g}" for sign, limit in bounds if limit is not None]
     return " and ".join(parts)

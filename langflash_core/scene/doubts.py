@@ -14,6 +14,8 @@ from langflash_core.scene.settings import DOUBTS
 
 _REMEDY = "take more photos {}, with more light, and hold still"
 _AGAIN = "take {} again with more light, and hold still"
+_REWORDED = ("as it is wide, only its centre", "as wide, only the centre")
+"""What notes in files of before say, and how it is said now."""
 
 
 def doubtful(record: Record, num_views: int) -> dict[int, str]:
@@ -40,15 +42,16 @@ def told_warnings(record: Record, num_views: int) -> tuple[str, ...]:
 
 def join_alike(notes: Sequence[str], names: Sequence[str]) -> tuple[str, ...]:
     """Notes of photos so named, with those that say the same of several as one: "photos 3 and 5 are dark". Of
-    photos that were left out, which have no number, "NAME: what became of it" is joined by names."""
+    photos that were left out, which have no number, "NAME: what became of it" is joined by names, and so are
+    those of which another has the name."""
     of_whom: dict[str, list[str]] = {}
-    for note in notes:
+    for note in (note.replace(*_REWORDED) for note in notes):
         named = next((name for name in names if name and note.startswith(f"{name} ")), "")
         who = named or (note.partition(": ")[0] if ": " in note else "")
         of_whom.setdefault(note[len(who) :], []).append(who)
     told = list[str]()
     for said, who in of_whom.items():
-        numbered = all(name in names for name in who)
+        numbered = all(names.count(name) == 1 for name in who)
         subject = _photos([names.index(name) for name in who]) if numbered else _list_some(who)
         told.append(f"{subject}{_plural(said)}" if len(who) > 1 and all(who) else f"{who[0]}{said}")
     return tuple(told)

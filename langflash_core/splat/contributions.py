@@ -55,7 +55,6 @@ def contributions(
         for _, rows, clipped in _rectangles(footprints, (x0, y0, x1, y1), wanted):
             _raise_to(result, footprints, rows, clipped, pixels, through)
     return result
-    return result
 
 
 def composition(footprints: Footprints, x: int, y: int) -> tuple[Int[Tensor, " n"], Float[Tensor, " n"]]:

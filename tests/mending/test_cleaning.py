@@ -86,6 +86,11 @@ def test_colours_and_photos_can_be_asked_for(known):
     assert unseen.any() and seen.any() and (unseen ^ seen).all()
 
 
+def test_a_rule_is_told_in_its_own_order(known):
+    recipe = Recipe(rules=(parsed_rule("size>.2,colour~#264d53:.12,depth<1"),))
+    assert [*apply_recipe(known.scene, recipe).counts] == ["size > 0.2 and colour and depth < 1"]
+
+
 def test_inverted_and_boxed(known):
     scene = known.scene
     rule = (parsed_rule("opacity>.5"),)

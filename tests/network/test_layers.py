@@ -6,7 +6,6 @@ import pytest
 import torch
 from torch.nn import functional as F
 
-from langflash_core.network.encoders.shared import Tokens
 from langflash_core.network.layers.attention import CrossBlock, rope_2d
 from langflash_core.network.layers.decoder import TwoStackDecoder, normalised_intrinsics
 from langflash_core.network.presets import MINI
@@ -14,13 +13,6 @@ from langflash_core.network.semantics.aggregation import Aggregation, average_at
 from langflash_core.network.semantics.grouping import Groups, group_weights, surviving
 
 GRID = (3, 4)
-
-
-def _tokens(num_views: int) -> Tokens:
-    torch.manual_seed(num_views)
-    n = GRID[0] * GRID[1]
-    hooks = [torch.randn(1, num_views, n, MINI.encoder_dim) for _ in range(7)]
-    return Tokens(tuple(hooks[:4]), GRID, tuple(hooks[4:6]), tuple(hooks[6:]))
 
 
 def _intrinsics(num_views: int) -> torch.Tensor:

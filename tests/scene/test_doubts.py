@@ -89,6 +89,24 @@ def test_notes_that_say_the_same_of_several_photos_are_one():
     )
 
 
+def test_photos_of_one_name_are_not_numbered():
+    """Nobody knows which of them is meant."""
+    said = " is very dark; take it again with more light"
+    record = Record(photos=("a.jpg", "b.jpg", "a.jpg"), warnings=tuple(f"{who}.jpg{said}" for who in "aab"))
+    assert told_warnings(record, 3) == (
+        "a.jpg, a.jpg and b.jpg are very dark; take them again with more light",
+    )
+
+
+def test_words_of_before_are_told_as_those_of_now():
+    before = " is 2.3 times as long as it is wide, only its centre is used; use plain photos"
+    now = " is 2.3 times as long as wide, only the centre is used; use plain photos"
+    record = Record(photos=("a", "b", "c"), warnings=(f"a{before}", f"b{before}", f"c{now}"))
+    assert told_warnings(record, 3) == (
+        "photos 1, 2 and 3 are 2.3 times as long as wide, only the centre is used; use plain photos",
+    )
+
+
 def test_photos_that_were_left_out_for_one_reason_are_one_sentence():
     """By their names, since the scene does not number them; files of before have a sentence of each."""
     names = ("0102.jpg", "0108.jpg", "0114.jpg")

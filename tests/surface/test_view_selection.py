@@ -82,11 +82,6 @@ def grown(cells: Tensor, by: int = 1) -> Tensor:
     return torch.nn.functional.max_pool2d(cells[None].float(), size, 1, by)[0] > 0
 
 
-def without_tips(cells: Tensor) -> Tensor:
-    """Those in a square of 3 x 3 of them: no crumb, and no end of a wedge."""
-    return grown(~grown(~cells))
-
-
 @pytest.mark.parametrize("views", [1, 2, 5])
 def test_of_equal_photos_the_first_keeps_all(views):
     keep = select_views(*seen([camera()] * views))

@@ -342,9 +342,8 @@ def cases_markdown(protocol: str, result: dict) -> str:
     """Measures and labels, beside what papers say of themselves."""
     chosen, known = PROTOCOLS[protocol], result["intervals"]
     about = f"{result['cases']} cases of {result['scenes']} scenes; in brackets 95 % of draws of scenes."
-    measured = {key: value for key, value in result["measures"].items() if value is not None}
     tables = [
-        measures_table("", MEASURES, measured, known),
+        measures_table("", MEASURES, result["measures"], known),
         labels_table("", METHODS, COLUMNS, result["labels"], known),
     ]
     text = markdown(tables, f"## {chosen.title}", chosen.about, about)

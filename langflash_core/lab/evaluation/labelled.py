@@ -181,10 +181,9 @@ def run_photos(
     """
     progress("names of the folder", 0.0)
     setting = Judged.of(folder, bench)
-    photos = ((id, folder.photo(id)) for id in ids)
     kept = judged(
-        photos,
-        lambda photo, _: judge(setting, photo),
+        ((id, id) for id in ids),
+        lambda id, _: judge(setting, folder.photo(id)),
         count=len(ids),
         shelf=shelf,
         progress=lambda stage, fraction: progress(f"photo {stage}", 0.1 + 0.9 * fraction),

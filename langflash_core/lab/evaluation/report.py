@@ -109,7 +109,7 @@ def section_of(
     place: Workplace,
     shelf: Shelf,
     title: str,
-    about: str,
+    about: Callable[[Sequence[str]], str],
     cases: Iterable[tuple[str, Any]],
     count: int,
     judge: Callable[[Any, Look], Any],
@@ -120,7 +120,7 @@ def section_of(
     """Cases judged into a section of the shelf's name.
 
     Args:
-        about: "{count}", "{first}" and "{last}" stand for how many cases there are, and for their names.
+        about: what is said of cases of these names.
         judge: of a case, with whom to show a picture of it.
     """
     gallery, name = Gallery(shelf.folder / "pictures"), shelf.folder.name
@@ -137,7 +137,7 @@ def section_of(
     return Section(
         name,
         title,
-        about.format(count=len(kept), first=names[0], last=names[-1]),
+        about(names),
         result,
         bounds,
         tables(result, bounds),
@@ -165,8 +165,10 @@ def rooms_section(data: Path, place: Workplace, limit: int | None = None) -> Sec
         place,
         place.shelf("rooms", RoomTally, data=str(data.resolve()), groups=setting.groups),
         "Rooms",
-        "{count} rooms, seeds {first} to {last}, furniture held out from training; two photos make the "
-        "scene, a third view judges it where a photo sees the surface.",
+        lambda names: (
+            f"{len(names)} rooms, seeds {names[0]} to {names[-1]}, furniture held out from training; two "
+            "photos make the scene, a third view judges it where a photo sees the surface."
+        ),
         rooms.named_records(held_out),
         len(held_out),
         lambda record, look: rooms.judge(setting, record, look),
@@ -182,16 +184,16 @@ def ablations_section(data: Path, place: Workplace, limit: int | None = None) ->
     setting, fits, count, cases = study.opened_study(
         data, place.bench.weights, limit=limit, most=ABLATED, shelf=shelf, progress=place.progress
     )
-    about = (
-        f"{{count}} of the rooms, taken evenly; {len(setting.groups)} class groups. All rivals draw the same "
-        "Gaussians from the same camera by the same rasteriser; times are of drawing and decoding, in one "
-        'process, and "x atoms" is the mean over rooms of the ratio to the atoms in the same room.'
-    )
     return section_of(
         place,
         study.grouped_shelf(shelf, setting),
         "What pays: groups, vectors, K, and rivals",
-        about,
+        lambda names: (
+            f"{len(names)} of the rooms, taken evenly; {len(setting.groups)} class groups. All rivals draw "
+            "the same Gaussians from the same camera by the same rasteriser; times are of drawing and "
+            'decoding, in one process, and "x atoms" is the mean over rooms of the ratio to the atoms in the '
+            "same room."
+        ),
         cases,
         count,
         lambda record, look: study.judge(setting, fits, record),
@@ -214,7 +216,7 @@ def sides_section(pack: Path, place: Workplace, limit: int | None = None) -> Sec
         place,
         place.shelf("sides", Rows, pack=str(pack.resolve())),
         "Rooms seen from aside",
-        "{count} rooms, drawn from 10 to 45 degrees aside and from over and under.",
+        lambda names: f"{len(names)} rooms, drawn from 10 to 45 degrees aside and from over and under.",
         cases(),
         count,
         lambda case, look: Rows([sides.judge(case, place.bench)]),
@@ -253,8 +255,11 @@ def _sharp_section(
         place,
         shelf,
         title,
-        "{count} pairs; each scene is drawn from its photos' own places, and from that of a kept one "
-        "between, at their size, at most three times the network's grid, beside the photo through that grid.",
+        lambda names: (
+            f"{len(names)} pairs; each scene is drawn from its photos' own places, and from that of a kept "
+            "one between, at their size, at most three times the network's grid, beside the photo through "
+            "that grid."
+        ),
         ((subject.name, subject) for subject in subjects),
         count,
         lambda subject, look: Rows([sharp.judge(subject, bench, look)]),
@@ -271,8 +276,10 @@ def posed_section(folder: PhotoFolder, place: Workplace, limit: int | None = Non
         place,
         place.shelf("posed", posed.Tally, **_described(folder)),
         "Real photos of known poses",
-        f"{{count}} pairs of {folder.root.name}, {', '.join(map(str, APART))} numbers apart; the photo "
-        "half-way between is drawn from its true place.",
+        lambda names: (
+            f"{len(names)} pairs of {folder.root.name}, {', '.join(map(str, APART))} numbers apart; the "
+            "photo half-way between is drawn from its true place."
+        ),
         ((triple.name, triple) for triple in triples),
         len(triples),
         lambda triple, look: posed.judge(folder, triple, bench, look),
@@ -289,7 +296,10 @@ def photos_section(folder: PhotoFolder, ids: Sequence[str], place: Workplace) ->
         place,
         place.shelf("photos", labelled.Tally, **_described(folder), words=words),
         "Real photos with labels",
-        f"{{count}} photos of {folder.root.name}, each reconstructed alone and asked as anybody would ask.",
+        lambda names: (
+            f"{len(names)} photos of {folder.root.name}, each reconstructed alone and asked as anybody would "
+            "ask."
+        ),
         ((id, id) for id in ids),
         len(ids),
         lambda id, look: labelled.judge(setting, folder.photo(id), look),

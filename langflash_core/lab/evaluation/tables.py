@@ -102,7 +102,7 @@ def measures_table(
     measures: Numbers,
     intervals: Intervals | None = None,
 ) -> Table:
-    """Measures beside a trivial rival, with intervals where they are known.
+    """Measures beside a trivial rival, with intervals where they are known; what was not taken is left out.
 
     Args:
         rows: text, key of the measure, name of the rival, its key.
@@ -112,10 +112,10 @@ def measures_table(
             text,
             cell(measures[key]),
             span((intervals or {}).get(f"measures/{key}")),
-            f"{cell(measures[rival_key])} ({rival})" if rival_key in measures else "",
+            f"{cell(measures[rival_key])} ({rival})" if measures.get(rival_key) is not None else "",
         )
         for text, key, rival, rival_key in rows
-        if key in measures
+        if measures.get(key) is not None
     ]
     columns = [0, 1, *([] if intervals is None else [2]), *([3] if any(row[3] for row in kept) else [])]
     header = ("measure", "value", "95 % of draws", "trivial rival")

@@ -25,11 +25,12 @@ from langflash_core.lab.evaluation.intervals import bootstrap
 from langflash_core.lab.evaluation.metrics import PoseError, Presence
 from langflash_core.lab.evaluation.segments import ClassQuality, Panoptic
 from langflash_core.lab.training.measures import nan_mean
+from langflash_core.language.leads import FILE as LEADS
 from langflash_core.network import PRESETS
 from langflash_core.network.checkpoints.store import part_folder
 
 Item = TypeVar("Item")
-MEASURES = 4
+MEASURES = 5
 """Raised whenever a measure changes, so that what was kept before is judged anew."""
 _VALUES: dict[str, type] = {kind.__name__: kind for kind in (PoseError, Presence, ClassQuality, Panoptic)}
 _TYPES = {str(kind): kind for kind in (torch.int64, torch.float32, torch.float64, torch.bool)}
@@ -152,12 +153,13 @@ class Shelf:
 
 
 def identity(weights: Path | None, preset: str) -> str:
-    """Which weights a tally was made with: the digest of the file named or shipped, or of those installed."""
-    shipped = asset_path(f"weights/{preset}.safetensors")
+    """Which weights a tally was made with: the digest of the file named or shipped, or of those installed,
+    and of what phrases start with."""
+    shipped = asset_path("weights") / f"{preset}.safetensors"
     paths = [weights] if weights is not None else [shipped] if shipped.is_file() else []
     paths = paths or sorted(part_folder(PRESETS[preset]).glob("*.safetensors"))
     total = hashlib.sha256(preset.encode())
-    for path in paths:
+    for path in (*paths, asset_path(LEADS)):
         with path.open("rb") as stream:
             total.update(hashlib.file_digest(stream, "sha256").digest())
     return total.hexdigest()[:16]

@@ -1,7 +1,11 @@
 """The threshold of several sets, and what the diagram says of their scores."""
 
+import io
+
+import numpy as np
 import pytest
 import torch
+from PIL import Image
 
 from langflash_core.errors import InputError
 from langflash_core.lab.evaluation.calibration import (
@@ -86,3 +90,12 @@ def test_reliability_of_known_scores():
 def test_nothing_asked_is_refused():
     with pytest.raises(InputError, match="nothing could be asked"):
         Asked.of([], [], [])
+
+
+def test_the_diagram_is_drawn():
+    pytest.importorskip("matplotlib")
+    from langflash_core.lab.evaluation.calibration_plot import calibration_png
+
+    png = calibration_png({"rooms": asked(0.7), "photos": asked(0.6, 1)}, 0.66)
+    picture = np.asarray(Image.open(io.BytesIO(png)).convert("RGB"))
+    assert picture.shape[1] > 600 and len(np.unique(picture.reshape(-1, 3), axis=0)) > 20

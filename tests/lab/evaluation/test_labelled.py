@@ -9,9 +9,11 @@ import torch
 from langflash_core.errors import InputError
 from langflash_core.lab.evaluation import bench, labelled
 from langflash_core.lab.evaluation.bench import Bench
+from langflash_core.lab.evaluation.calibration import photos_asked
 from langflash_core.lab.evaluation.leads import learned_leads
 from langflash_core.lab.evaluation.photo_words import PhotoWords, absent_rows, paper_row, photos_of_names
 from langflash_core.lab.evaluation.tables import markdown
+from langflash_core.lab.evaluation.tallies import Shelf
 from langflash_core.lab.evaluation.words import PAPER_LABELS
 from langflash_core.lab.photos import Name, PhotoFolder
 from langflash_core.language.settings import RIVALS
@@ -64,6 +66,24 @@ def test_the_truth_scores_as_the_truth(folder: PhotoFolder, program):
     assert measures["masks_right_atoms"] == measures["mask_names_right_features"] == 1
     # Photo 004 shows everything that may be asked, so nothing is absent from it.
     assert len(tally.scores) == 2 and all(t.float().mean() == 0.5 for t in tally.truths)
+
+
+def test_what_is_kept_is_not_even_decoded(folder: PhotoFolder, program, tmp_path, monkeypatch):
+    def judged() -> dict:
+        shelf = Shelf(tmp_path, {}, labelled.Tally)
+        return labelled.run_photos(folder, folder.ids[2:4], Bench(render), shelf=shelf)[0]
+
+    result = judged()
+    monkeypatch.setattr(PhotoFolder, "photo", lambda *_: pytest.fail("decoded"))
+    assert judged() == result
+
+
+def test_a_calibration_asks_what_a_run_asks(folder: PhotoFolder, program):
+    found = photos_asked(folder, folder.ids[2:5], Bench(render))
+    _, tally = labelled.run_photos(folder, folder.ids[2:5], Bench(render))
+    assert torch.equal(found.scores, torch.cat(tally.scores)) and len(found.scores) > 0
+    assert torch.equal(found.truths, torch.cat(tally.truths))
+    assert torch.equal(found.ious, torch.stack(tally.ious)) and len(found.ious) == int(found.truths.sum())
 
 
 def test_tables_say_what_the_result_says(folder: PhotoFolder, program):

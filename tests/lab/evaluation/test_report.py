@@ -4,6 +4,7 @@ import csv
 import io
 import json
 import re
+from contextlib import nullcontext
 from dataclasses import replace
 from pathlib import Path
 
@@ -11,14 +12,17 @@ import numpy as np
 import pytest
 
 from langflash_core.base.colormaps import HEAT_STOPS
-from langflash_core.lab.evaluation import bench, labelled, report_page
+from langflash_core.lab.evaluation import bench, labelled, report, report_page
 from langflash_core.lab.evaluation.bench import Bench
 from langflash_core.lab.evaluation.drawing import drawn_frame
+from langflash_core.lab.evaluation.posed import APART, chosen_triples
 from langflash_core.lab.evaluation.report import PUBLISHED, Sources, Workplace, plans
 from langflash_core.lab.evaluation.report_parts import Gallery, Plot, Point
 from langflash_core.lab.evaluation.report_plot import svg
+from langflash_core.lab.evaluation.sharp_subjects import posed_subjects
+from langflash_core.lab.evaluation.side_subjects import posed_cases
 from langflash_core.lab.evaluation.sights import Sight, heat_picture, label_picture, legend_of
-from langflash_core.lab.evaluation.tables import Table
+from langflash_core.lab.evaluation.tables import Table, markdown
 from langflash_core.lab.photos import PhotoFolder
 from langflash_core.network import MINI
 from langflash_core.splat import render
@@ -28,7 +32,8 @@ from tests.lab.evaluation.real_photos import KnowingNet, knowing, write_folder
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory) -> PhotoFolder:
-    return write_folder(tmp_path_factory.mktemp("report") / "photos", 14)
+    """Its name could be taken for a place to fill in."""
+    return write_folder(tmp_path_factory.mktemp("report") / "{kitchen}", 14)
 
 
 @pytest.fixture
@@ -64,6 +69,8 @@ def test_a_report_holds_every_number_and_goes_on_where_it_stopped(folder, progra
     found = made(folder, tmp_path)
     assert [section.name for section in found] == ["posed", "sharp_posed", "photos"]
     pairs, sharp_pairs, photos = found
+    assert pairs.about.startswith("2 pairs of {kitchen}, ")
+    assert photos.about.startswith("2 photos of {kitchen}, ")
     assert pairs.result["measures"]["pose_auc_5"] > 0.99 and pairs.result["scenes"] == 2
     low, high = pairs.intervals["measures/psnr"]
     assert low <= pairs.result["measures"]["psnr"] <= high
@@ -80,6 +87,24 @@ def test_a_report_holds_every_number_and_goes_on_where_it_stopped(folder, progra
     assert again[0].result == pairs.result and again[0].scenes == pairs.scenes
     made(replace(folder, depth_unit=0.0011), tmp_path)
     assert len(program) > before  # by other depths
+
+
+def test_rooms_of_a_pack_are_two_sections(folder, program, tmp_path, monkeypatch):
+    """Pairs of photos stand for rooms, which would have to be drawn."""
+    triples = chosen_triples(folder.ids, 2, APART)
+    monkeypatch.setattr(report, "load_pack", lambda path: path)
+    monkeypatch.setattr(report, "RoomRenderer", nullcontext)
+    monkeypatch.setattr(report, "room_cases", lambda *_, count: posed_cases(folder, triples[:count]))
+    monkeypatch.setattr(report, "room_subjects", lambda *_, count: posed_subjects(folder, triples[:count]))
+    place = Workplace(Bench(drawn), tmp_path)
+    aside, sharp = (judge(place) for judge in plans(Sources(pack=folder.root, limit=2)))
+    assert (aside.name, sharp.name) == ("sides", "sharp_rooms")
+    assert aside.about.startswith("2 rooms, ") and sharp.about.startswith("2 pairs; ")
+    table = markdown(aside.tables)
+    assert "| measure | mean of 2 |" in table and "| between the photos | 2 | " in table
+    low, high = aside.intervals["by_look/between/psnr"] or (0.0, 0.0)
+    assert low <= aside.result["by_look"]["between"]["psnr"] <= high
+    assert sharp.tables[0].header == ("measure", "photo through the grid", "plain", "normal")
 
 
 def test_the_page_needs_nothing_from_elsewhere_and_escapes_what_it_says(folder, program, tmp_path):

@@ -10,12 +10,13 @@ import torch
 from langflash_core.errors import InputError
 from langflash_core.geometry.cameras import invert_rigid, unproject
 from langflash_core.geometry.harmonics import colour_to_sh
+from langflash_core.lab.evaluation.calibration import calibration, rooms_asked
 from langflash_core.lab.evaluation.rooms import phrases, run, summary, truth
 from langflash_core.lab.evaluation.rooms.tally import Setting, Tally
 from langflash_core.lab.evaluation.tables import markdown
 from langflash_core.lab.training.shards import Label, write_shard
 from langflash_core.language.spaces import language_space
-from langflash_core.network import MINI, GuidedDepthNet, save_network
+from langflash_core.network import MINI, GuidedDepthNet, load_network, save_network
 from langflash_core.types import Gaussians, Prediction
 from tests.lab.training.conftest import SIZE, toy_record
 
@@ -62,6 +63,16 @@ def test_a_run_measures_everything(cache: Path, weights: Path):
     table = markdown(summary.tables(result))
     assert "| Depth AbsRel, view 1 |" in table
     assert table.count("\n|") > 20
+
+
+@pytest.mark.slow
+def test_calibration_is_a_threshold_for_queries(cache: Path, weights: Path):
+    network = load_network("mini", weights)
+    found = calibration(network, {"rooms": rooms_asked(network, cache)})
+    assert 0 < found["threshold"] < 1
+    assert found["temperature"] > 0
+    assert found["validation"]["rooms"]["phrases"] > 0
+    json.dumps(found, allow_nan=False)
 
 
 def test_a_missing_cache_is_refused(tmp_path: Path):

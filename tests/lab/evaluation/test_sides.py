@@ -3,13 +3,15 @@
 import json
 from dataclasses import replace
 
+import numpy as np
 import pytest
 import torch
+from PIL import Image
 
 from langflash_core.errors import InputError
 from langflash_core.geometry.cameras import invert_rigid
 from langflash_core.lab.evaluation import bench
-from langflash_core.lab.evaluation.bench import Bench
+from langflash_core.lab.evaluation.bench import Bench, files_of
 from langflash_core.lab.evaluation.posed import Triple
 from langflash_core.lab.evaluation.side_subjects import posed_cases
 from langflash_core.lab.evaluation.sides import (
@@ -46,6 +48,14 @@ def scene(folder: PhotoFolder) -> Scene:
 def judged(scene: Scene, folder: PhotoFolder) -> dict:
     (case,) = posed_cases(folder, [TRIPLE])
     return judge_scene(scene, case.truth(SIZE), Bench(render))
+
+
+def test_files_of_photos_show_the_same_pixels(folder: PhotoFolder):
+    photos = [folder.photo(id) for id in folder.ids[:2]]
+    with files_of(photos) as paths:
+        assert [path.stem for path in paths] == ["001", "002"]
+        for photo, path in zip(photos, paths, strict=True):
+            assert np.array_equal(np.asarray(Image.open(path)), photo.image)
 
 
 def test_the_truth_scores_as_the_truth(folder: PhotoFolder, scene: Scene):

@@ -7,7 +7,17 @@ import pytest
 import torch
 
 from langflash_core.lab.evaluation.metrics import PoseError, Presence
-from langflash_core.lab.evaluation.tallies import Shelf, intervals, judged, merged, numbers_of, plain, revived
+from langflash_core.lab.evaluation.tallies import (
+    Shelf,
+    identity,
+    intervals,
+    judged,
+    merged,
+    numbers_of,
+    plain,
+    revived,
+)
+from langflash_core.language.leads import FILE as LEADS
 
 
 @dataclass
@@ -71,6 +81,19 @@ def test_what_was_made_otherwise_or_is_damaged_is_made_again(tmp_path):
     (tmp_path / "one.json").write_text('{"key": {"weights": "b"}, "tally": {"of": "Other"}}')
     judged(items, judge, shelf=Shelf(tmp_path, {"weights": "b"}, Made))
     assert asked == [1, 2, 1, 2, 1]
+
+
+def test_with_other_leads_tallies_are_made_anew(tmp_path, monkeypatch):
+    """With weights that were named, and with those of a preset that does not come with the program."""
+    monkeypatch.setattr("langflash_core.base.resources._ROOT", tmp_path)
+    leads, weights = tmp_path / "assets" / LEADS, tmp_path / "own.safetensors"
+    leads.parent.mkdir(parents=True)
+    weights.write_bytes(b"weights")
+    found = set()
+    for content in (b"some", b"others"):
+        leads.write_bytes(content)
+        found |= {identity(weights, "mini"), identity(None, "full")}
+    assert len(found) == 4
 
 
 def test_intervals_have_the_paths_of_the_summary():

@@ -152,6 +152,13 @@ def test_the_teacher_says_the_same_of_a_mirrored_photo_mirrored(network):
     assert not torch.allclose(hidden, one, atol=1e-3), "one look is another"
 
 
+def test_depth_is_not_said_of_what_was_pasted():
+    maps = fewlabels.without(torch.ones(2, 6, 8), [(1, 2, 4, 5), (0, 0, 0, 0)])
+    assert (
+        float(maps[0].sum()) == 48 - 9 and float(maps[0, 1:4, 2:5].sum()) == 0 and bool((maps[1] == 1).all())
+    )
+
+
 def test_scaled_matrices_are_scaled_answers(network):
     """A skipping block at rest gives what the encoder's own block gives."""
     base = network.encoder.vit.blocks[-1]
@@ -237,3 +244,22 @@ def test_photos_without_labels_teach_by_the_teacher_alone(sets, network, monkeyp
     total.backward()
     taught = any(p.grad is not None and bool(p.grad.abs().sum() > 0) for p in made.late.parameters())
     assert taught == (sure == 0) and math.isfinite(float(total.detach()))
+
+
+@pytest.mark.slow
+def test_an_interrupted_run_of_batches_drawn_ahead_goes_on_as_one_that_was_not(sets, tmp_path):
+    table = build_table([Label(*names) for names in NAMES], encode)
+    options = LoopOptions(minutes=10, report_s=0.0, learning_rate=2e-3, pictures=1, workers=1)
+
+    def losses(folder, *stops: int) -> list[float]:
+        for stop in stops:
+            torch.manual_seed(0)
+            network = build_network(MINI)
+            network.begin_halves()
+            train_few(network, sets, None, table, folder, replace(options, max_steps=stop))
+        rows = [json.loads(line) for line in (folder / "late_few.jsonl").read_text().splitlines()]
+        return [row["loss"] for row in rows if row["kind"] == "train" and "loss" in row]
+
+    assert losses(tmp_path / "whole", 2)[1] == pytest.approx(
+        losses(tmp_path / "cut", 1, 2)[1], rel=1e-3
+    )  # Adam makes rounding large; other photos: tenths

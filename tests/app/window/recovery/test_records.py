@@ -188,9 +188,6 @@ def scene(folders: Path) -> Path:
     return path
 
 
-POSE = Pose(Vector(0.1, 0.2, 0.3))
-
-
 def left(scene: Path) -> Kept:
     return Kept(
         scene=str(scene), phrases=("a chair",), likes=("",), pose=Pose(Vector(0.1, 0.2, 0.3)), views=4
