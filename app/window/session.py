@@ -37,7 +37,7 @@ from .kit.textures import Thumbnails
 from .opening.effects import OpeningEffects
 from .recovery import preferences
 from .recovery.commands import Prefer
-from .recovery.effects import RecoveryEffects, Writer
+from .recovery.effects import RecoveryEffects
 from .recovery.preferences import Preferences
 from .recovery.records import Keeper
 from .recovery.tiles import TileEffects
@@ -101,8 +101,8 @@ class Session:
     def _begin(self, remembered: Preferences, complaint: str, paths: Sequence[str | Path]) -> None:
         """Every feature's effects, and the first commands."""
         hands = Hands(self._perform, self._post, self._worker.submit, self._worker.cancel, self._now)
-        keeper, write = Keeper(), Writer(hands)
-        recovery = RecoveryEffects(hands, keeper, write)
+        keeper = Keeper()
+        recovery = RecoveryEffects(hands, keeper)
         copied = lambda: desktop.clipboard(self._window, "surrogateescape")  # noqa: E731
         entitle = lambda title: glfw.set_window_title(self._window, title)  # noqa: E731
         opening = OpeningEffects(hands, self._thumbnails, copied)
@@ -111,8 +111,8 @@ class Session:
             opening,
             AskingEffects(hands, self._viewport),
             EditingEffects(hands, self._viewport),
-            TileEffects(hands, self._viewport, self._thumbnails, write),  # before who closes their writer
             recovery,
+            TileEffects(hands, self._viewport, self._thumbnails),
             ExportingEffects(hands, keeper),
             FilmingEffects(hands),
             TouringEffects(hands, self._viewport),

@@ -82,6 +82,17 @@ def _row(ended: Ended) -> Row:
     reason = made.reason
     if reason and job.folder.exists():
         reason += "; what lies in its folder is from before"
-    told = {**vars(made), "reason": reason, "warnings": " | ".join(made.warnings)}
-    own = {"retried": ended.retried, "photos": len(job.photos), "fingerprint": job.fingerprint}
-    return Row(job.name, FAILED if reason else DONE, **told, **own)
+    return Row(
+        job.name,
+        FAILED if reason else DONE,
+        reason=reason,
+        retried=ended.retried,
+        seconds=made.seconds,
+        photos=len(job.photos),
+        gaussians=made.gaussians,
+        groups=made.groups,
+        found=made.found,
+        memory_mb=made.memory_mb,
+        warnings=" | ".join(made.warnings),
+        fingerprint=job.fingerprint,
+    )

@@ -7,6 +7,7 @@ scale s maps it onto the output: x' = (x - left) s, hence f' = f s and c' = (c -
 
 import io
 import math
+from collections import Counter
 from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
@@ -106,9 +107,9 @@ def photo_names(paths: list[Path]) -> tuple[str, ...]:
     """File names, of a film's frames the film and the time; with their folder where different files share a
     name."""
     plain = [shown_name(path.name) or str(path) for path in paths]
-    clashing = {a.name for a in paths for b in paths if a.name == b.name and a != b}
+    files = Counter(path.name for path in set(paths))
     return tuple(
-        f"{path.parent.name}/{name}" if path.name in clashing and path.parent.name else name
+        f"{path.parent.name}/{name}" if files[path.name] > 1 and path.parent.name else name
         for path, name in zip(paths, plain, strict=True)
     )
 

@@ -74,7 +74,7 @@ class Easel:
         self._times_marked = 0
         self._painted: tuple | None = None  # all that the texture shows
         self._scored: tuple | None = None  # picture and question of the last view
-        self._chosen = 0  # the last question whose phrases chose among what answers their heads
+        self._chosen = frozenset[str]()  # phrases that chose among what answers their heads, last
 
     # --- what to show -----------------------------------------------------------------------
 
@@ -174,8 +174,7 @@ class Easel:
         until "red armchair" is told from every armchair."""
         if not drawn.plan.covers(replace(drawn.plan, kind=kind_of(state))):
             return pictures.RGB
-        query = self.asked.query
-        unchosen = query is not None and query.narrows and self._chosen != self.asked.number
+        unchosen = not _choosing(self.asked.query) <= self._chosen
         if state.scene.mode.answers and (not asked or len(asked) != len(self.asked.keys) or unchosen):
             return pictures.RGB
         return state.scene.mode if possible(state.scene.mode, state.scene.info) else pictures.RGB
@@ -240,13 +239,21 @@ class Easel:
         return Numbers(renderer.frame(), renderer.relevance(), others)
 
     def narrow(self, name: tuple, relevance: "Tensor") -> None:
-        """Show this relevance (P, H, W), if the picture and the question of `View.name` are on show; if another
-        picture came meanwhile, the next that rests is scored again."""
+        """Show this relevance (P, H, W), if the picture and the question of `View.name` are on show; if
+        another picture came meanwhile, the next that rests is scored again."""
         if name == self._scored and name[0] != self.drawn:
             self._scored = None
         elif name == self._scored:
             self.renderer.narrow(relevance)
-            self._chosen, self._painted = self.asked.number, None
+            self._chosen, self._painted = _choosing(self.asked.query), None
+
+
+def _choosing(query: "CompiledQuery | None") -> frozenset[str]:
+    """Phrases that choose among what answers their heads."""
+    if query is None:
+        return frozenset()
+    read = zip(query.texts, query.readings, strict=False)  # no readings: all are asked as they stand
+    return frozenset(text for text, reading in read if reading.narrows)
 
 
 def _place(camera: "Camera", x: int, y: int, depth: float) -> tuple[float, float, float]:

@@ -115,8 +115,10 @@ class ExportingEffects(Effects):
         try:
             self._start(wanted, state, bool(found))
         except LangFlashError as error:
+            self._leave_nothing()
             perform(Notify(str(error)))
         except OSError as error:
+            self._leave_nothing()
             perform(Notify(f"The export cannot be started: {error.strerror or error}."))
         else:
             perform(ExportBegan(wanted.request.output))

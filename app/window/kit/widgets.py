@@ -142,13 +142,6 @@ def answers(look: Look, *given: Answer[_Value], default: int = 0) -> list[_Value
     return issued
 
 
-def toggle(label: str, on: bool, tip: str = "", size: ImVec2 | None = None) -> bool:
-    """A button that stands out while what it says is so; whether it was pressed."""
-    pressed = primary_button(label, size) if on else imgui.button(label, size or ImVec2(0, 0))
-    tooltip(tip)
-    return pressed
-
-
 def default_button(label: str, size: ImVec2 | None = None, confirmed: bool = False) -> bool:
     """The primary button of a dialog, which Enter presses too, unless the keys are on another control.
     confirmed: Enter has ended what is typed in the field that the dialog is about."""
@@ -179,8 +172,8 @@ def choice(options: Sequence[tuple[str, _Value]], chosen: _Value) -> _Value:
     for index, (label, value) in enumerate(options):
         if index:
             beside(button_width(label), 0.5 * imgui.get_style().item_spacing.x)
-        if toggle(label, value == chosen):
-            chosen = value
+        pressed = press(label, value, on=value == chosen)
+        chosen = pressed[0] if pressed else chosen
     imgui.end_group()
     return chosen
 

@@ -61,7 +61,7 @@ NOT_SAVED, NOT_REMEMBERED = "The session could not be saved", "What was open cou
 
 
 class Writer:
-    """The thread of one that writes small files."""
+    """A thread of one that writes small files."""
 
     def __init__(self, hands: Hands) -> None:
         self._hands = hands
@@ -83,12 +83,12 @@ class Writer:
 
 
 class RecoveryEffects(Effects):
-    """The one keeper of records, edits and preferences. write: shared, and closed here."""
+    """The one keeper of records, edits and preferences."""
 
-    def __init__(self, hands: Hands, keeper: Keeper, write: Writer) -> None:
+    def __init__(self, hands: Hands, keeper: Keeper) -> None:
         self._hands = hands
         self._keeper = keeper
-        self._write = write
+        self._write = Writer(hands)
         self._wanted: Kept | None = None  # the record whose scene is being opened
         self._restoring_edits: Path | None = None  # a file of edits that comes with it
         self._outlived: Path | None = None  # a restored session that goes once this one has its own
@@ -213,7 +213,7 @@ class RecoveryEffects(Effects):
         if state.preferences != before.preferences:
             self._save_at = state.now + SAVE_AFTER
             if set(before.preferences.recent) - set(state.preferences.recent):
-                self._write(records.sweep, state.preferences.recent)
+                self._write(records.forget_others, state.preferences.recent, records.RECORD)
         snapshot = _snapshot(state)
         if snapshot != self._snapshot:
             self._snapshot, self._keep_at = snapshot, state.now + KEEP_AFTER

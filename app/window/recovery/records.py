@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import BinaryIO
 
 from langflash_core.base.files import make_folder, write_atomically
+from langflash_core.errors import OutputError
 from langflash_core.geometry.poses import read_pose
 
 from ...places import PICTURE, PROJECT, earlier_projects, project_file, state_folder
@@ -86,6 +87,8 @@ class Keeper:
     def close(self) -> None:
         """The session has ended well."""
         self._ended = True
+        with suppress(OSError):  # while it is locked: else another window finds one that nobody closed
+            self.file.unlink(missing_ok=True)
         if self._lock is not None:
             self._lock.close()
             self._lock = None
@@ -166,7 +169,7 @@ def project(path: str) -> Kept:
     files = [project_file(path, RECORD), *newest_first(f"{SESSION}*{RECORD}")]
     for file in sorted(files, key=modified, reverse=True):
         with suppress(OSError):
-            kept = read(file) if file.stat().st_size <= MOST_RECORD else None
+            kept = read(file, path) if file.stat().st_size <= MOST_RECORD else None
             if kept is not None and kept.scene == path:
                 return kept.closed()
     return Kept(scene=path)
@@ -175,18 +178,29 @@ def project(path: str) -> Kept:
 def sweep(recent: Iterable[str]) -> tuple[str, ...]:
     """Remove projects that have gone, or are not among the recent ones; returns those that are there."""
     _take_over()
+    found = newest_first(f"{PROJECT}*")  # what is written while a disk is waited for is none of them
     there = tuple(path for path in recent if path and os.path.isfile(path))
-    names = {project_file(path, suffix).name for path in there for suffix in (RECORD, PICTURE)}
-    for file in newest_first(f"{PROJECT}*"):
+    _keep_alone(there, found)
+    return there
+
+
+def forget_others(recent: Iterable[str], suffix: str) -> None:
+    """Remove what is kept of scenes that are not among the recent ones, without a look at those. suffix: of
+    records or of pictures."""
+    _keep_alone(recent, newest_first(f"{PROJECT}*{suffix}"))
+
+
+def _keep_alone(recent: Iterable[str], found: Iterable[Path]) -> None:
+    names = {project_file(path, suffix).name for path in recent for suffix in (RECORD, PICTURE)}
+    for file in found:
         if file.name not in names:
             with suppress(OSError):
                 file.unlink()
-    return there
 
 
 def _take_over() -> None:
     """What earlier versions kept of projects, beside the preferences."""
-    with suppress(OSError):
+    with suppress(OSError, OutputError):
         for file in list(earlier_projects().iterdir()):
             make_folder(state_folder())
             shutil.move(file, state_folder() / f"{PROJECT}{file.name}")
@@ -222,15 +236,21 @@ def told(kept: Kept) -> bytes:
     return json.dumps(content).encode()
 
 
-def read(file: Path) -> Kept | None:
-    """A record without what has gone since; None where the file is damaged.
+def read(file: Path, scene: str | None = None) -> Kept | None:
+    """A record without what has gone since; None where the file is damaged, or of another scene than `scene`,
+    whose photos are not looked for.
 
     Raises:
         OSError: the system does not give it.
     """
     stored, when = file.read_bytes(), datetime.fromtimestamp(file.stat().st_mtime)
     try:
-        return replace(_understood(json.loads(stored)), file=file, when=when)
+        content = json.loads(stored)
+        if "session" in content:  # a project of an earlier version
+            content = {**content["session"], "views": content["views"]}
+        if scene is not None and content["scene"] != scene:
+            return None
+        return replace(_understood(content), file=file, when=when)
     except DAMAGED:
         return None
 
@@ -241,8 +261,6 @@ def _understood(content: dict) -> Kept:
     Raises:
         One of `DAMAGED`: it is something else.
     """
-    if "session" in content:  # a project of an earlier version
-        content = {**content["session"], "views": content["views"]}
     pose, aside = content.pop("pose"), content.pop("aside", None)
     lists = {name: tuple(content.pop(name)) for name in ("photos", "fovs", "phrases")}
     asked = _asked(content, len(lists["phrases"]))

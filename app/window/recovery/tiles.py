@@ -3,7 +3,8 @@
 A picture names the file that it is of, by a stamp of size and time, and counts for no other: what somebody
 hid in that file meanwhile is not shown by it. None is kept of what is not, or not yet, in the scene's file:
 of a scene that nobody saved, or in which something was hidden for good. While tiles are on show their files
-are looked at again: another process may hide something in one of them.
+are looked at again: another process may hide something in one of them. A thread of its own does so: they may
+lie on a disk that sleeps.
 """
 
 import io
@@ -11,6 +12,7 @@ from concurrent.futures import Future
 from contextlib import suppress
 from pathlib import Path
 
+import moderngl
 import numpy as np
 from jaxtyping import UInt8
 from PIL import Image, ImageOps
@@ -26,6 +28,7 @@ from ..kit.textures import Thumbnails
 from ..scene.commands import JobCancelled, JobFailed, OpenScene, SceneArrived, SceneSaved
 from ..state import State
 from ..viewport import Viewport
+from . import records
 from .commands import ForgetRecent, PictureGone
 from .effects import NEVER, NOT_REMEMBERED, Writer
 from .state import Kept
@@ -42,11 +45,11 @@ _QUALITIES = (80, 65, 50, 35, 20, 10)  # of JPEG, until it is small enough
 class TileEffects(Effects):
     """The one writer of small pictures. viewport: what is seen; thumbnails: of the projects on show."""
 
-    def __init__(self, hands: Hands, viewport: Viewport, thumbnails: Thumbnails, write: Writer) -> None:
+    def __init__(self, hands: Hands, viewport: Viewport, thumbnails: Thumbnails) -> None:
         self._hands = hands
         self._viewport = viewport
         self._thumbnails = thumbnails
-        self._write = write
+        self._write = Writer(hands)
         self._reading: Path | None = None  # the file whose scene is to come
         self._stamps: dict[int, str] = {}  # of scenes by their number: the file that they are in
         self._last: tuple | None = None  # what was pictured last
@@ -72,9 +75,11 @@ class TileEffects(Effects):
             self._remember(state)
 
     def close(self, state: State, crashed: bool) -> None:
-        """Picture what has not rested yet."""
-        if self._at < NEVER:
-            self._remember(state)
+        """Picture what has not rested yet; after a crash nothing is read back."""
+        if self._at < NEVER and not crashed:
+            with suppress(MemoryError, moderngl.Error):
+                self._remember(state)
+        self._write.close()
 
     def follow(self, command: Command, before: State, state: State) -> None:
         """Pictures go that show what is not there any more."""
@@ -97,6 +102,8 @@ class TileEffects(Effects):
                     self._thumbnails.drop(project.picture)
             case _:
                 pass
+        if set(before.preferences.recent) - set(state.preferences.recent):
+            self._write(records.forget_others, state.preferences.recent, PICTURE)
         if _about(before) != _about(state):
             self._at = state.now + REMEMBER_AFTER
 

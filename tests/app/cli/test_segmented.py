@@ -76,7 +76,9 @@ def test_masks_are_of_what_was_asked(folder, manifest):
     cut = pixels(view / "armchair_cutout.png")
     assert np.array_equal(cut[..., 3], np.rint(soft / 257))
     labels, instances = pixels(view / "labels.png"), pixels(view / "instances.png")
-    assert np.array_equal(labels == 1, instances == 1) and set(np.unique(labels)) == {1, 2}
+    assert np.array_equal(labels == 1, instances == 1) and set(np.unique(labels)) == {0, 1, 2}
+    thirds = [WIDTH // 6, WIDTH // 2, 5 * WIDTH // 6]
+    assert labels[HEIGHT // 2, thirds].tolist() == [1, 2, 0]  # "wooden floor" is no "floor lamp"
     legend = json.loads((view / "instances.json").read_text("utf-8"))
     assert [entry["label"] for entry in legend["labels"]] == ["", "armchair 1", "floor lamp 1"]
 
@@ -129,7 +131,7 @@ def test_one_view_and_a_size(done, scene_file, tmp_path):
 
 
 def test_phrases_may_be_called_union(done, scene_file, tmp_path):
-    words = ("--segmented", "--threshold", "0.01", "--prompt", "union", "!?", *TORCH)
+    words = ("--segmented", "--threshold", "0.000001", "--prompt", "union", "!?", *TORCH)
     done("export", scene_file, "-o", tmp_path / "out", *words)
     names = {path.name for path in (tmp_path / "out" / "photo_1").iterdir()}
     assert {"union_mask.png", "union_2_mask.png", "prompt_2_mask.png"} <= names

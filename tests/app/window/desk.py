@@ -4,7 +4,7 @@ from dataclasses import dataclass, field
 
 from app.window.commands import Command, OfScene, Tick, apply
 from app.window.effects import Effects, Hands
-from app.window.recovery.effects import RecoveryEffects, Writer
+from app.window.recovery.effects import RecoveryEffects
 from app.window.recovery.records import Keeper
 from app.window.requests import Job, SceneTask, Task
 from app.window.state import State
@@ -68,13 +68,13 @@ class Desk(Bare):
 
     def __post_init__(self) -> None:
         super().__post_init__()
-        self.keeper, self.write = Keeper(), Writer(self.hands)
-        self.effects = RecoveryEffects(self.hands, self.keeper, self.write)
+        self.keeper = Keeper()
+        self.effects = RecoveryEffects(self.hands, self.keeper)
         self.followers = (self.effects,)
 
     def written(self) -> None:
         """Once the writer's thread has done all that it was given."""
-        self.write(lambda: None).result()
+        self.effects._write(lambda: None).result(timeout=10)
 
     def die(self) -> None:
         """The system opens the lock of whoever does."""

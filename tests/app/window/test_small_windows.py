@@ -134,12 +134,12 @@ def test_small_tools_show_their_whole_icons(monkeypatch) -> None:
     """Each was half as wide as its button's padding left."""
     seen: list[tuple[float, float]] = []
 
-    def button(icon: str, on: bool, tip: str, side: ImVec2) -> bool:
+    def button(icon: str, command: Command, tip: str, side: ImVec2, **_) -> list[Command]:
         padding = imgui.get_style().frame_padding.x
         seen.append((imgui.calc_text_size(icon).x + 2 * padding, side.x))
-        return False
+        return []
 
-    monkeypatch.setattr(tools.widgets, "toggle", button)
+    monkeypatch.setattr(tools.widgets, "press", button)
     with context((800, 500)):
         theme.set_up(1.0, "dark")
         frames(lambda at: tools.draw(shown_scene(), at, ImVec2(348, 52), ImVec2(452, 416)), look())

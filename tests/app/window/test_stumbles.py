@@ -239,7 +239,7 @@ def test_keys_lead_around_the_scene(way: str, axis: int, sign: int) -> None:
 def test_every_window_with_something_to_press_is_an_area(items: Items) -> None:
     """F6 leads there; those without are said here."""
     code = "\n".join(path.read_text() for path in Path(layout.__file__).parents[1].rglob("*.py"))
-    names = set(re.findall(r'(?:imgui\.begin|widgets\.window|_panel)\(f?"([^"]+)"', code))
+    names = set(re.findall(r'(?:imgui\.begin|widgets\.window|widgets\.floating|_panel)\(f?"([^"]+)"', code))
     silent = {"##toast{toast.key}", "##splitter", "##status", "##picture", "##legend", "##axes"}
     bars = {f"##bar{number}" for number in range(5)}
     assert names - silent - {"##bar{number}"} | bars == set(keys.AREAS)

@@ -412,13 +412,20 @@ def test_what_a_phrase_does_not_mean_leaves_the_picture_and_no_splat_is_drawn(vi
         assert pixels is not None
         return pixels
 
+    def ask(*phrases: str) -> None:
+        nonlocal state
+        query = compile_spoken(scene, space, phrases)
+        asked = tuple(
+            replace(state.asking.prompts[0], key=key, text=phrase, calibrated=query.threshold)
+            for key, phrase in enumerate(phrases)
+        )
+        state = state.with_asking(prompts=asked)
+        viewport.ask(tuple(range(len(phrases))), query, state.asking.revision)
+
     def seen(phrase: str) -> tuple[Narrowed | None, Answered, np.ndarray]:
         """The answer, and the picture once it is narrowed."""
         nonlocal state
-        query = compile_spoken(scene, space, [phrase])
-        asked = replace(state.asking.prompts[0], text=phrase, calibrated=query.threshold)
-        state = state.with_asking(prompts=(asked,))
-        viewport.ask((asked.key,), query, state.asking.revision)
+        ask(phrase)
         view, frames = None, living(viewport, state, count=600)
         for state in frames:
             view = viewport.view(state) or view
@@ -440,6 +447,8 @@ def test_what_a_phrase_does_not_mean_leaves_the_picture_and_no_splat_is_drawn(vi
     colours, state = shown(), heat
     passes = dict(viewport.stats().passes)
     kept, _, red = seen("red armchair in front of the wall")
+    ask("red armchair in front of the wall", "door")
+    assert not np.array_equal(shown(), colours), "a second phrase takes no heat from the first"
     gone, none, blue = seen("blue armchair")
     assert kept is not None and gone is not None and float(kept.relevance.max()) > 0.9
     assert none.scores[0][2] == 0 and gone.notes[0][2] == "no armchair here looks blue"

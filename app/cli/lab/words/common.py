@@ -19,11 +19,6 @@ def add_count(command, name: str, purpose: str, usual: int | None = None, **more
     command.add_argument(name, type=whole_count, default=usual, metavar="N", help=purpose, **more)
 
 
-def add_switch(command, name: str, purpose: str) -> None:
-    """Said or not."""
-    command.add_argument(name, action="store_true", help=purpose)
-
-
 def add_folder(command, purpose: str, **more: Any) -> None:
     """Photos in a layout of ours: FOLDER, or with `name` an option for it."""
     name = more.pop("name", None)
@@ -90,8 +85,8 @@ def add_judging(command, presets: tuple[str, ...] = ("mini",)) -> None:
     add_tables(command, "the tables as .md (default: print them)")
 
 
-def add_device(command) -> None:
-    """On what it runs."""
+def add_processor(command) -> None:
+    """On what it runs, the CPU unless it is said."""
     command.add_argument("--device", choices=("cpu", "cuda"), default="cpu", help="(default: cpu)")
 
 

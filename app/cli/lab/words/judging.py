@@ -3,7 +3,15 @@
 import argparse
 
 from ...values import above_zero, pixel_side, seed, whole_count
-from ...words.shared import add_backend, add_description, add_json, add_output, new_actions, new_command
+from ...words.shared import (
+    add_backend,
+    add_description,
+    add_json,
+    add_output,
+    add_switch,
+    new_actions,
+    new_command,
+)
 from .common import (
     add_apart,
     add_cache,
@@ -16,7 +24,6 @@ from .common import (
     add_pack,
     add_path,
     add_posed,
-    add_switch,
     add_tables,
 )
 from .training import add_label_models

@@ -5,8 +5,8 @@ import argparse
 from langflash_core.network.presets import PRECISIONS
 
 from ...values import above_zero, minutes, seed, share, size, whole_count
-from ...words.shared import add_json, add_output, new_actions, new_command
-from .common import add_cache, add_count, add_device, add_folder, add_part, add_path, add_preset, add_switch
+from ...words.shared import add_json, add_output, add_switch, new_actions, new_command
+from .common import add_cache, add_count, add_folder, add_part, add_path, add_preset, add_processor
 
 # langflash_core.lab.photos.layouts.LAYOUTS, which would bring torch along.
 LAYOUTS = (
@@ -66,7 +66,7 @@ def add_labels(commands) -> None:
     inside = command.add_mutually_exclusive_group()
     add_switch(inside, "--enrich", "put labels into the split's chunks afterwards, in place")
     add_switch(inside, "--extract", "make no labels: take those in the split's chunks out to OUT")
-    add_device(command)
+    add_processor(command)
     add_json(command)
 
 
@@ -213,7 +213,7 @@ def _add_outlines(actions) -> None:
         help="the square that MobileSAM sees (default: 512; 1024 takes four times as long)",
     )
     add_count(command, "--grid", "points along the longer side (default: 12)", 12)
-    add_device(command)
+    add_processor(command)
     add_part(command)
 
 

@@ -92,7 +92,7 @@ def _plot(prompt: Prompt, counts: np.ndarray, known: Reliability | None, look: L
             spec = implot.Spec()
             spec.line_color, spec.line_weight = theme.MUTED, look.px(1.5)
             implot.plot_line("##reliability", np.array(known.scores), top * np.array(known.present), spec)
-        moved, cut, *_ = implot.drag_line_x(1, prompt.cut, theme.TEXT, look.px(2))
+        moved, cut = _drag_line(prompt.cut, look)
         if moved:
             issued.append(ask.SetThreshold(prompt.key, min(max(cut, 0.0), 1.0)))
         if implot.is_plot_hovered():
@@ -101,6 +101,19 @@ def _plot(prompt: Prompt, counts: np.ndarray, known: Reliability | None, look: L
     implot.pop_style_color(2)
     implot.pop_style_var()
     return issued
+
+
+def _drag_line(cut: float, look: Look) -> tuple[bool, float]:
+    """The threshold's line; whether it was moved, and where to. It follows the pointer to where it is let go
+    also where that comes in the frame of the last move."""
+    moved, cut, _, _, held = implot.drag_line_x(
+        1, cut, theme.TEXT, look.px(2), out_clicked=False, out_hovered=False, out_held=False
+    )
+    storage, holding = imgui.get_state_storage(), imgui.get_id("held")
+    if storage.get_bool(holding) and not held and imgui.get_mouse_drag_delta(0).x:
+        moved, cut = True, implot.get_plot_mouse_pos().x
+    storage.set_bool(holding, bool(held))
+    return moved, cut
 
 
 def _tip(prompt: Prompt, counts: np.ndarray, known: Reliability | None) -> None:

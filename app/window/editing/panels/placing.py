@@ -31,8 +31,8 @@ def draw(state: State, look: Look, right: float) -> list[do.Command]:
     imgui.push_style_var(imgui.StyleVar_.item_spacing, look.vec(4, 4))
     for handle, icon, tip in _HANDLES:
         tip = f"{tip}\nCtrl snaps, Ctrl+arrows move in steps"
-        if widgets.toggle(f"{icon}##{handle.name}", editing.handle is handle, tip):
-            issued.append(placing.SetHandle(handle))
+        taken = placing.SetHandle(handle)
+        issued += widgets.press(f"{icon}##{handle.name}", taken, tip, on=editing.handle is handle)
         imgui.same_line()
     imgui.pop_style_var()
     if editing.marks is None or info is None or not editing.marks.selected:

@@ -122,13 +122,13 @@ def _strip(state: State, look: Look, wide: float) -> list[do.Command]:
     imgui.push_style_var(imgui.StyleVar_.item_spacing, look.vec(_GAP, _GAP))
     imgui.push_style_var(imgui.StyleVar_.frame_padding, ImVec2(0, 0))  # small buttons hold their icons, too
     for tool, icon, tip in _TOOLS:
-        if widgets.toggle(icon, editing.tool is tool, tip, side):
-            taken = tool is Tool.PLACE
-            issued.append(placing.SetHandle(editing.handle) if taken else point.SetTool(tool))
+        taken = placing.SetHandle(editing.handle) if tool is Tool.PLACE else point.SetTool(tool)
+        issued += widgets.press(icon, taken, tip, side, on=editing.tool is tool)
     imgui.separator()
     tip = "Remove floaters and stray bits, with a preview; within the selection, if there is one"
-    if widgets.toggle(fa.ICON_FA_WAND_MAGIC_SPARKLES, editing.floaters is not None, tip, side):
-        issued.append(edit.FindFloaters() if editing.floaters is None else edit.EndFloaters())
+    shown = editing.floaters is not None
+    wanted = edit.EndFloaters() if shown else edit.FindFloaters()
+    issued += widgets.press(fa.ICON_FA_WAND_MAGIC_SPARKLES, wanted, tip, side, on=shown)
     imgui.separator()
     history = editing.history
     last = history.done[-1].label if history and history.done else ""
@@ -142,10 +142,8 @@ def _strip(state: State, look: Look, wide: float) -> list[do.Command]:
         (fa.ICON_FA_ROTATE_LEFT, "Undo", last, "Ctrl+Z", back),
         (fa.ICON_FA_ROTATE_RIGHT, "Redo", following, "Ctrl+Shift+Z", edit.Redo()),
     ):
-        imgui.begin_disabled(not label)
-        if widgets.toggle(icon, False, f"{verb}: {label}  ({keys})" if label else f"{verb}  ({keys})", side):
-            issued.append(command)
-        imgui.end_disabled()
+        tip = f"{verb}: {label}  ({keys})" if label else f"{verb}  ({keys})"
+        issued += widgets.press(icon, command, tip, side, able=bool(label))
     imgui.pop_style_var(2)
     return issued
 
@@ -155,7 +153,7 @@ def _button(
 ) -> list[do.Command]:
     """In a bar, beside what is there, or below where that ends at `right`; what it does once pressed."""
     widgets.go_on(widgets.button_width(label), right, gap)
-    return [command] if widgets.toggle(label, on, tip) else []
+    return widgets.press(label, command, tip, on=on)
 
 
 def _options(state: State, look: Look, right: float) -> list[do.Command]:
@@ -164,8 +162,8 @@ def _options(state: State, look: Look, right: float) -> list[do.Command]:
     editing = state.editing
     imgui.push_style_var(imgui.StyleVar_.item_spacing, look.vec(4, 4))
     for combine, icon, tip in _COMBINES:
-        if widgets.toggle(f"{icon}##{combine}", editing.combine == combine, tip):
-            issued.append(point.SetCombine(combine))
+        wanted = point.SetCombine(combine)
+        issued += widgets.press(f"{icon}##{combine}", wanted, tip, on=editing.combine == combine)
         imgui.same_line()
     imgui.pop_style_var()
     label, tip = f"{fa.ICON_FA_LAYER_GROUP}  Through", "Also select what is hidden behind other things"
@@ -272,7 +270,7 @@ def _actions(right: float) -> list[do.Command]:
     for place, (icon, tip, command) in enumerate(actions):
         if place:
             widgets.go_on(widgets.button_width(icon), right)
-        issued += [command] if widgets.toggle(icon, False, tip) else []
+        issued += widgets.press(icon, command, tip)
     return issued
 
 

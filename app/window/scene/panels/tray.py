@@ -9,6 +9,7 @@ from imgui_bundle import icons_fontawesome_6 as fa
 from langflash_core.base.records import FoundLens
 from langflash_core.base.running import time_left
 from langflash_core.geometry.poses import FOV_RANGE
+from langflash_core.images.pictures import photo_names
 from langflash_core.images.still_names import shown_name
 from langflash_core.scene.doubts import join_alike
 
@@ -69,14 +70,25 @@ def _row(state: State, look: Look) -> list[do.Command]:
 def _sentences(state: State) -> list[str]:
     """Each once: what is known of a photo, the scene made of it says."""
     said = [photo.problem for photo in state.scene.photos if photo.problem]
-    names = [shown_name(photo.path.name) for photo in state.scene.photos]
-    made = state.scene.info.scene.record.photos if state.scene.info else ()
-    alone = [photo.notes for name, photo in zip(names, state.scene.photos, strict=True) if name not in made]
-    said += join_alike([note for notes in alone for note in notes], names)
+    said += _notes(state)
     said += state.scene.info.warnings if state.scene.info else ()
     if state.scene.info is not None and len(state.scene.info.views) == 1 and state.scene.info.scene.photos:
         said.append(ONE_PHOTO)
     return sentences(said, HOW_TO_TELL if state.scene.photos else WITHOUT_PHOTOS)
+
+
+def _notes(state: State) -> tuple[str, ...]:
+    """What is known of photos, under names that tell them apart, and the scene on show does not say."""
+    if not any(photo.notes for photo in state.scene.photos):
+        return ()
+    told = state.scene.info.scene.record.warnings if state.scene.info else ()
+    names = photo_names([photo.path for photo in state.scene.photos])
+    notes = (
+        f"{name}{note.removeprefix(shown_name(photo.path.name))}"
+        for name, photo in zip(names, state.scene.photos, strict=True)
+        for note in photo.notes
+    )
+    return join_alike([note for note in notes if note not in told], names)
 
 
 def sentences(said: Iterable[str], how: str = HOW_TO_TELL) -> list[str]:

@@ -1,12 +1,13 @@
 """Found, maybe, not found; what the scene knows; phrases in another language."""
 
+import re
 from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 import torch
-from imgui_bundle import implot
+from imgui_bundle import imgui, implot
 
 from app.window.asking import commands as ask
 from app.window.asking import things
@@ -18,6 +19,7 @@ from app.window.editing.pointing import AtomsNamed
 from app.window.editing.work import NameAtoms
 from app.window.inventory.state import Row
 from app.window.kit import theme
+from app.window.kit.look import Look
 from app.window.scene.panels import tray
 from app.window.scene.state import Photo
 from app.window.scene.work import describe_scene
@@ -203,6 +205,41 @@ def test_what_a_score_is_worth_is_not_told_of_what_was_not_scored(
     assert sum("of the time" in row.words for row in rows.now()) == told
 
 
+def test_a_threshold_is_where_its_line_is_let_go(monkeypatch) -> None:
+    """Where frames are slow the last move and the release come in one."""
+    prompt = Prompt(0, "door", score=0.5, threshold=0.3)
+    states = [shown_scene().with_asking(prompts=(prompt,), histograms=(Histogram(0, "door", (1,) * BINS),))]
+    places, end = [], implot.end_plot
+
+    def end_plot() -> None:
+        places[:] = [implot.plot_to_pixels(score, 0.5) for score in (0.3, 0.6, 0.9)]
+        end()
+
+    def draw(seen: Look) -> None:
+        for command in scores.draw(states[-1], seen):
+            states.append(after(states[-1], command))
+
+    monkeypatch.setattr(implot, "end_plot", end_plot)
+    with context((500, 500)):
+        implot.create_context()
+        theme.set_up(1.0, "dark")
+        frames(draw, look())
+        line, nearer, there = places
+        io = imgui.get_io()
+        for down in (True, False, True):  # a click alone moves nothing
+            io.add_mouse_pos_event(line.x, line.y)
+            io.add_mouse_button_event(0, down)
+            frames(draw, look(), 2)
+        assert len(states) == 1
+        io.add_mouse_pos_event(nearer.x, nearer.y)
+        frames(draw, look(), 1)
+        io.add_mouse_pos_event(there.x, there.y)
+        io.add_mouse_button_event(0, False)
+        frames(draw, look(), 2)
+        implot.destroy_context()
+    assert states[-1].asking.prompts[0].threshold == pytest.approx(0.9, abs=0.01)
+
+
 def test_a_chip_asks_its_word() -> None:
     state = after(shown_scene(), ask.AskAgain("floor"))
     assert [prompt.text for prompt in state.asking.prompts] == ["door", "floor"]
@@ -210,7 +247,9 @@ def test_a_chip_asks_its_word() -> None:
 
 def test_what_the_model_knows_is_what_its_card_says() -> None:
     card = asset_path("weights/mini_card.md").read_text()
-    assert "37 classes, atoms drawn" in card and ".410 / .751" in card and "75 %" in KNOWS
+    found = re.search(r"(\d+) classes, atoms drawn: mIoU / accuracy \| \.\d+ / (\.\d+) ", card)
+    assert found is not None
+    assert f"{float(found[2]):.0%}".replace("%", " %") in KNOWS and f"({found[1]} kinds" in KNOWS
 
 
 def test_one_photo_is_told_to_leave_depth_a_guess() -> None:

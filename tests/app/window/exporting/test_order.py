@@ -1,5 +1,6 @@
 """The export form and the command line that it comes to."""
 
+import errno
 import shlex
 from dataclasses import replace
 from pathlib import Path
@@ -278,6 +279,18 @@ def test_an_export_that_failed_leaves_no_camera_behind(monkeypatch, folders: Pat
     assert [toast.text for toast in desk.state.toasts][
         -1
     ] == "not found in this view: chair; lower its threshold"
+
+
+def test_an_export_that_cannot_be_started_leaves_no_camera_behind(monkeypatch, folders: Path) -> None:
+    def start(*_) -> None:
+        raise OSError(errno.ENOMEM, "Cannot allocate memory")
+
+    monkeypatch.setattr(Exporter, "start", start)
+    state = form(scene(folders / "room.langflash"), path=str(folders / "a.png"))
+    desk = Desk(state, lambda hands, _world: ExportingEffects(hands, Keeper()))
+    desk.perform(export.Export(sure=True))
+    assert "cannot be started: Cannot allocate" in desk.state.toasts[-1].text
+    assert not (folders / "a.camera.json").exists()
 
 
 def test_a_heat_map_is_exported_in_the_window_s_own_colours() -> None:

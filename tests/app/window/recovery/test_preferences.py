@@ -1,18 +1,21 @@
 """Preferences last, and a bad file never stops the start."""
 
 import json
-from dataclasses import replace
+from dataclasses import fields, replace
 from pathlib import Path
 
 import pytest
 
 from app.window.asking.commands import OpenDictionary
 from app.window.commands import Command
+from app.window.frame import table
 from app.window.recovery import locks, panels, preferences
 from app.window.recovery.commands import Prefer
 from app.window.recovery.preferences import DEFAULTS, MOST_RECENT, PANEL_WIDTHS, Preferences
 from app.window.state import State
 from tests.app.window.headless import context, frames, look
+from tests.app.window.scene.test_standing import STANDS
+from tests.app.window.scenes import shown_scene
 from tests.torture.failing import failing
 
 
@@ -75,6 +78,32 @@ def test_a_detail_is_chosen_in_the_panel(monkeypatch: pytest.MonkeyPatch) -> Non
     with context((800, 600)):
         frames(lambda seen: found.extend(panels.draw_settings(State(), seen)), look(), 1)
     assert found == [Prefer(replace(DEFAULTS, detail="high"))]
+
+
+def test_what_is_set_by_name_is_a_preference(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Types do not see it."""
+    other = lambda options, old: next(value for _, value in options if value != old)  # noqa: E731
+    monkeypatch.setattr(panels.widgets, "choice", other)
+    monkeypatch.setattr(panels.widgets, "worded_checkbox", lambda _, on: (True, not on))
+    issued: list[Command] = []
+    with context((800, 600)):
+        frames(lambda seen: issued.extend(panels.draw_settings(State(), seen)), look(), 1)
+    looks = {"theme", "colormap", "detail", "scale"}
+    switches = {"photos_in_space", "near_photos", "fill_gaps", "floor_grid"}
+    assert changed(issued[0], DEFAULTS) == looks | switches | {"touch_pad", "start_at_once"}
+    state = shown_scene()
+    assert state.editing.history is not None
+    marks = replace(state.editing.history.marks, world=STANDS)
+    state = state.with_editing(history=state.editing.history.edited("Level", marks))
+    made = [entry.make(state) for entry in table.ENTRIES]
+    told = [changed(command, state.preferences) for command in made if isinstance(command, Prefer)]
+    assert set[str]().union(*told) == switches
+
+
+def changed(command: Command, before: Preferences) -> set[str]:
+    assert isinstance(command, Prefer)
+    after = command.preferences
+    return {each.name for each in fields(before) if getattr(after, each.name) != getattr(before, each.name)}
 
 
 def test_recent_files_are_few_and_newest_first() -> None:

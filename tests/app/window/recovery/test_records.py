@@ -8,6 +8,7 @@ import sys
 from dataclasses import replace
 from datetime import datetime
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
@@ -73,6 +74,18 @@ def test_a_session_that_runs_or_ended_well_is_not_offered(folders: Path) -> None
     assert records.left_behind() is None and list(state_folder().iterdir()) == []
     keeper.keep(Kept(phrases=("wall",)))  # a late write after the end writes nothing
     assert list(state_folder().iterdir()) == []
+
+
+def test_a_session_that_ends_well_is_gone_before_its_lock_is_free(folders: Path) -> None:
+    """Another window that looked in between offered it."""
+    keeper, seen = Keeper(), []
+    keeper.keep(Kept(phrases=("door",)))
+    lock = keeper._lock
+    assert lock is not None and keeper.file.exists()
+    keeper._lock = SimpleNamespace(close=lambda: seen.append(keeper.file.exists()))  # type: ignore[assignment]
+    keeper.close()
+    lock.close()
+    assert seen == [False] and list(state_folder().iterdir()) == []
 
 
 def test_the_camera_comes_back_exactly(folders: Path) -> None:
@@ -221,6 +234,35 @@ def test_of_a_damaged_record_the_path_is_left(scene: Path, change) -> None:
     file = record_of(scene)
     file.write_bytes(change(json.loads(file.read_bytes())))
     assert records.project(str(scene)) == Kept(scene=str(scene))
+
+
+def test_photos_of_other_scenes_are_not_looked_for(scene: Path, monkeypatch) -> None:
+    """Of each there may be 300, on a disk that sleeps, and the window waits."""
+    record_of(scene)
+    session = state_folder() / "session-1-00000001.json"
+    photos = tuple(f"/far/{number}.jpg" for number in range(3))
+    other = replace(left(scene), scene="/far/other.langflash", photos=photos, fovs=(None,) * 3)
+    session.write_bytes(records.told(other))
+    isfile, asked = os.path.isfile, []
+    monkeypatch.setattr(os.path, "isfile", lambda path: asked.append(str(path)) or isfile(path))
+    assert records.project(str(scene)).phrases == ("a chair",)
+    assert not [path for path in asked if path.startswith("/far")]
+
+
+def test_what_is_kept_while_a_sweep_waits_for_a_disk_stays(scene: Path, monkeypatch) -> None:
+    with monkeypatch.context() as patch:
+        patch.setattr(os.path, "isfile", lambda _: records.keep_project(left(scene)) is None)
+        records.sweep(["/far/other.langflash"])
+    assert records.project(str(scene)).phrases == ("a chair",)
+
+
+def test_what_earlier_versions_kept_and_nobody_can_move_stops_no_sweep(scene: Path) -> None:
+    earlier = scene.parent / "config" / "projects"
+    earlier.mkdir(parents=True)
+    (earlier / "a.json").write_text("{}")
+    state_folder().parent.mkdir(parents=True, exist_ok=True)
+    state_folder().write_text("a file in the way")
+    assert records.sweep([str(scene)]) == (str(scene),)
 
 
 def test_what_belongs_to_no_recent_scene_is_swept_away(scene: Path) -> None:

@@ -1,5 +1,6 @@
 """Projects without a window: kept as a scene is left, opened so, pictured, gone with what they show."""
 
+import threading
 from collections.abc import Iterator
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -16,7 +17,9 @@ from app.window.editing.mending import HiddenForGood, RememberUnhidden
 from app.window.recovery import commands as keep
 from app.window.recovery import records, tiles
 from app.window.recovery.commands import Opened, OpenProject
+from app.window.recovery.effects import KEEP_AFTER
 from app.window.recovery.preferences import DEFAULTS, MOST_RECENT
+from app.window.recovery.state import Kept
 from app.window.recovery.tiles import LOOK_AGAIN, REMEMBER_AFTER, TileEffects, keep_picture, picture, stamp
 from app.window.recovery.work import ReadProjects
 from app.window.scene import commands as show
@@ -55,8 +58,12 @@ class Table(Desk):
     def __post_init__(self) -> None:
         super().__post_init__()
         self.picture = Seen()
-        self.tiles = TileEffects(self.hands, self.picture, self.picture, self.write)  # type: ignore[arg-type]
-        self.followers = (self.tiles, self.effects)
+        self.tiles = TileEffects(self.hands, self.picture, self.picture)  # type: ignore[arg-type]
+        self.followers = (self.effects, self.tiles)
+
+    def written(self) -> None:
+        super().written()
+        self.tiles._write(lambda: None).result(timeout=10)
 
     def settle(self) -> None:
         self.pass_time(1.1 * REMEMBER_AFTER)
@@ -68,9 +75,9 @@ class Table(Desk):
             if isinstance(command, ShowPicture):
                 self.picture.shades[command.key] = int(command.rgb.mean().round())
 
-    def close(self) -> None:
+    def close(self, crashed: bool = False) -> None:
         for effects in self.followers:
-            effects.close(self.state, crashed=False)
+            effects.close(self.state, crashed)
         self.followers = ()
 
     def shown(self) -> dict[str, int]:
@@ -183,6 +190,37 @@ def test_a_crash_that_nobody_goes_on_with_says_how_its_scene_was_left(desk: Tabl
     desk.written()
     assert records.left_behind() is None and not list(state_folder().glob("session-*"))
     assert records.project(str(path)).phrases == ("armchair",)
+
+
+def test_a_disk_that_sleeps_under_a_tile_holds_no_record_up(desk: Table, path: Path, monkeypatch) -> None:
+    asked, awake = threading.Event(), threading.Event()
+    monkeypatch.setattr(tiles, "stamp", lambda _: asked.set() or (awake.wait(10) and ""))
+    desk.perform(Opened(path), keep.ProjectsRead((Kept(scene=str(path)),)))
+    desk.pass_time(1.1 * LOOK_AGAIN)
+    assert asked.wait(5)
+    desk.perform(EditPrompt(0, "armchair"))
+    desk.pass_time(1.1 * KEEP_AFTER)
+    try:
+        desk.effects._write(lambda: None).result(timeout=5)
+        assert records.read(desk.keeper.file) is not None
+    finally:
+        awake.set()
+
+
+def test_a_picture_that_cannot_be_read_back_stops_no_closing(desk: Table, path: Path, monkeypatch) -> None:
+    """After a crash none is read back at all."""
+    asked = []
+
+    def seen() -> np.ndarray:
+        asked.append("read back")
+        raise MemoryError
+
+    monkeypatch.setattr(desk.picture, "seen", seen)
+    opened(desk, path)
+    desk.tiles.close(desk.state, crashed=True)
+    assert asked == []
+    desk.close()
+    assert asked and not desk.keeper.file.exists()
 
 
 def test_only_a_picture_that_is_whole_is_kept(desk: Table, path: Path) -> None:

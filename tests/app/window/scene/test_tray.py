@@ -140,6 +140,30 @@ def test_what_has_come_takes_clicks_once_it_is_seen(items: Items) -> None:
     assert living.done == [show.Reconstruct(), show.CancelJob()]
 
 
+DARK = "is very dark; take it again with more light"
+
+
+def with_dark(state: State, *paths: Path) -> State:
+    read = (show.PhotoRead(path, None, (f"{path.name} {DARK}",)) for path in paths)
+    return after(state, show.AddPhotos(paths), *read)
+
+
+def test_photos_of_one_name_are_told_apart() -> None:
+    (told,) = tray._sentences(with_dark(State(), Path("/a/left.jpg"), Path("/b/left.jpg"), Path("/b/c.jpg")))
+    assert told.startswith("Photos 1, 2 and 3 are very dark")
+
+
+@pytest.mark.parametrize("warnings", [(), (f"left.jpg {DARK}",)], ids=["another photo", "the same"])
+def test_what_the_scene_says_of_a_photo_is_said_once(warnings: tuple[str, ...]) -> None:
+    """A photo of another room in the tray may have the name of one that the scene on show is made of."""
+    state = shown_scene()
+    assert state.scene.info is not None
+    scene = state.scene.info.scene.with_record(photos=("left.jpg", "right.jpg"), warnings=warnings)
+    state = state.with_scene(info=replace(state.scene.info, scene=scene, warnings=warnings))
+    told = tray._sentences(with_dark(state, Path("/b/left.jpg")))
+    assert [each for each in told if "dark" in each] == [f"left.jpg {DARK}."]
+
+
 def test_the_space_bar_is_no_click() -> None:
     pressed = []
 
