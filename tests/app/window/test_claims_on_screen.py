@@ -70,7 +70,7 @@ def test_notes_of_several_photos_are_one_sentence_until_the_scene_says_it() -> N
     photos = tuple(Photo(Path(name), notes=said) for name, said in notes.items())
     joined = ["Photos 1 and 2 are very dark; take them again with more light."]
     assert tray._sentences(state.with_scene(photos=photos, info=None)) == joined
-    made = state.scene.info.scene.with_record(photos=tuple(notes))
+    made = state.scene.info.scene.with_record(photos=tuple(notes), warnings=sum(notes.values(), ()))
     info = replace(state.scene.info, scene=made, warnings=("both are dark",))
     assert tray._sentences(state.with_scene(photos=photos, info=info)) == ["Both are dark."]
 

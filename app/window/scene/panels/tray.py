@@ -84,7 +84,7 @@ def _notes(state: State) -> tuple[str, ...]:
     told = state.scene.info.scene.record.warnings if state.scene.info else ()
     names = photo_names([photo.path for photo in state.scene.photos])
     notes = (
-        f"{name}{note.removeprefix(shown_name(photo.path.name))}"
+        note.replace(own, name, 1) if note.startswith(own := shown_name(photo.path.name)) else note
         for name, photo in zip(names, state.scene.photos, strict=True)
         for note in photo.notes
     )
