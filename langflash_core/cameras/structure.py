@@ -58,7 +58,7 @@ def found_lenses(Ks: Float[Tensor, "V 3 3"], poses: Poses) -> Float[Tensor, "V 3
     """Intrinsics of the lenses that were found."""
     if poses.adjusted is None or (poses.growths == 1).all():
         return Ks
-    return torch.from_numpy(scale_focal(Ks.double().cpu().numpy(), poses.growths)).to(Ks)
+    return torch.from_numpy(scale_focal(Ks.cpu().double().numpy(), poses.growths)).to(Ks)
 
 
 def placed_rig(
@@ -72,11 +72,11 @@ def placed_rig(
     corrected = [
         _correct_depths(own, K, correction) + math.log(scale)
         for own, K, scale, correction in zip(
-            prior.log_depths[0], Ks, poses.depth_scales, poses.corrections, strict=True
+            prior.log_depths[0].cpu(), Ks.cpu(), poses.depth_scales, poses.corrections, strict=True
         )
     ]
     viewmats = torch.from_numpy(poses.viewmats).to(photos)
-    return Rig.of_logs(torch.stack(corrected), viewmats, Ks, prior.log_errors[0], photos)
+    return Rig.of_logs(torch.stack(corrected).to(Ks), viewmats, Ks, prior.log_errors[0], photos)
 
 
 def grey_photos(views: Views) -> list[UInt8[np.ndarray, "_ _"]]:
@@ -88,10 +88,10 @@ def grey_photos(views: Views) -> list[UInt8[np.ndarray, "_ _"]]:
 
 
 def _pose_inputs(Ks: Tensor, size: tuple[int, int], prior: DepthMaps, local: Tensor) -> list[PoseInput]:
-    depths = prior.depths[0].cpu().numpy()  # once: a view of every call's own would hold all of it
+    own = Ks.cpu().double(), prior.depths[0].cpu(), local.cpu()  # once: each call's own would hold all of it
     return [
-        PoseInput(K=K.double().cpu().numpy(), size=size, depth=depths[v], local=local[v].cpu().numpy())
-        for v, K in enumerate(Ks)
+        PoseInput(K=K, size=size, depth=depth, local=cells)
+        for K, depth, cells in zip(*(values.numpy() for values in own), strict=True)
     ]
 
 
@@ -117,6 +117,6 @@ def _sought_lenses(views: Views) -> Sought | None:
 def _correct_depths(log_depths: Tensor, K: Tensor, correction: Correction) -> Tensor:
     """Log depths (H, W) straightened by the matches."""
     height, width = log_depths.shape
-    x = rays(K, width, height)[..., :2].cpu().numpy()
-    change = correction.at(x, log_depths.cpu().numpy())
+    x = rays(K, width, height)[..., :2].numpy()
+    change = correction.at(x, log_depths.numpy())
     return log_depths + torch.from_numpy(change).to(log_depths)

@@ -51,22 +51,21 @@ def sweep_planes(
     stays as it is.
 
     Args:
-        photos: (_, _) uint8, grey, of each view, the rig's photos at any size.
+        rig: on the processor. photos: (_, _) uint8, grey, of each view, the rig's photos at any size.
         neighbours: of each view.
         check: called before each view is looked at; what it raises ends the work.
     """
-    maps = rig.log_depths.cpu()
     greys = [resize_photo(photo, rig.size) for photo in photos]
-    scene = _Scene(greys, [own.numpy() for own in maps], rig.viewmats.cpu().double(), rig.Ks.cpu().double())
+    scene = _Scene(greys, list(rig.log_depths.numpy()), rig.viewmats.double(), rig.Ks.double())
     found = []
     for view, others in enumerate(neighbours):
         check()
         found.append(_sweep_view(scene, view, others, settings=settings))
     changed = [
         own + _carried_over(scene, view, found, of, settings=settings)
-        for view, (own, of) in enumerate(zip(maps, neighbours, strict=True))
+        for view, (own, of) in enumerate(zip(rig.log_depths, neighbours, strict=True))
     ]
-    return rig.with_logs(torch.stack(changed).to(rig.depths))
+    return rig.with_logs(torch.stack(changed))
 
 
 @dataclass(frozen=True)

@@ -96,7 +96,7 @@ def register_depths(
     """Depths whose surfaces show the same in neighbouring photos; the expected errors stay.
 
     Args:
-        photos: (h, w) uint8, grey, of each view, the rig's photos at their own size.
+        rig: on the processor. photos: (h, w) uint8, grey, of each view, the rig's photos at their own size.
         neighbours: of each view, the best first; None: all others.
         check: called before each comparison; what it raises ends the work.
         each: gives the log depths (H, W) of a view, which it may have made, or know already.
@@ -112,19 +112,19 @@ def register_depths(
     pictures = _Pictures.of(photos, (height, width), rig.Ks, cells, settings)
 
     def corrected(view: int) -> Tensor:
-        own, others = logs[view].cpu(), near[view]
+        own, others = logs[view], near[view]
         for most in settings.rounds if len(others) > 1 else (1,):
             target, weight = torch.zeros(2, *cells)
             depths = F.interpolate(own[None, None], size=pictures.size, mode="bilinear")[0, 0]
             known = _Known.of(pictures.grey(view), settings)
             for other in others[:most]:
                 check()
-                pose = (rig.viewmats[other] @ invert_rigid(rig.viewmats[view])).cpu()
+                pose = rig.viewmats[other] @ invert_rigid(rig.viewmats[view])
                 change, counts = pictures.compare_views(view, other, depths, known, pose, settings=settings)
                 target += _cells(counts * change, cells)
                 weight += _cells(counts, cells)
             own = own + smooth(target, weight, own, guides[view], settings=settings)
-        return own.to(logs)
+        return own
 
     return rig.with_logs(torch.stack([each(view, partial(corrected, view)) for view in range(len(rig))]))
 
@@ -148,7 +148,7 @@ class _Pictures:
         """Ks: pixels of maps of so many cells."""
         ratio = torch.tensor([size[1] / cells[1], size[0] / cells[0], 1.0])
         grey = lru_cache(settings.at_hand)(lambda view: resize_photo(photos[view], size))
-        return _Pictures(grey, size, Ks.cpu() * ratio[:, None])
+        return _Pictures(grey, size, Ks * ratio[:, None])
 
     def compare_views(
         self,

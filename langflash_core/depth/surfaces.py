@@ -71,17 +71,24 @@ def one_surface(
 def _refine_depths(rig: Rig, greys: Sequence[np.ndarray], run: Run, settings: Surfaces) -> Rig:
     """Photos whose places are known."""
     near = source_views(rig, settings=settings.choice)
-    rig = sweep_planes(rig, greys, near, run.check, settings.plane_sweep)
+    rig = _beside(rig, lambda own: sweep_planes(own, greys, near, run.check, settings.plane_sweep))
     rig = sharpen(rig, settings.sharpening)
     told = run.counted("refinement", "photo", range(len(rig)), _SWEPT)
 
     def each(view: int, make: Callable[[], Tensor]) -> Tensor:
         next(told)
-        found = run.kept(f"depth-{view}", lambda: {"log_depths": make().cpu().numpy()})
-        return torch.from_numpy(np.array(found["log_depths"])).to(rig.depths)
+        found = run.kept(f"depth-{view}", lambda: {"log_depths": make().numpy()})
+        return torch.from_numpy(np.array(found["log_depths"]))
 
-    rig = register_depths(rig, greys, near, run.check, each, settings.registration)
+    rig = _beside(rig, lambda own: register_depths(own, greys, near, run.check, each, settings.registration))
     return flatten(rig, settings.flattening)
+
+
+def _beside(rig: Rig, work: Callable[[Rig], Rig]) -> Rig:
+    """The rig with the depths that `work` finds; of OpenCV and scipy, it sees poses, lenses and depths, on
+    the processor."""
+    own = Rig.of_logs(rig.log_depths.cpu(), rig.viewmats.cpu(), rig.Ks.cpu())
+    return rig.with_logs(work(own).log_depths.to(rig.depths))
 
 
 def sharpen(rig: Rig, settings: Sharpening = SHARPENING) -> Rig:

@@ -129,17 +129,17 @@ def sample_bilinear(
     are gathered, and not channel by channel, as `grid_sample` does, the twin, which it equals but for
     rounding.
     """
-    ends = ndc.new_tensor([size[1], size[0]])[:, None, None]
-    places = (ndc + 1) * (ends / 2) + 0.5  # pixels' centres are whole numbers, the first is 1
-    low = places.floor()
-    right, down = places - low
+    # Pixels' centres are whole numbers, the first is 1.
+    x, y = ((along + 1) * (side / 2) + 0.5 for along, side in zip(ndc, (size[1], size[0]), strict=True))
+    column, row = x.floor(), y.floor()
+    right, down = x - column, y - row
     left, up = 1 - right, 1 - down
-    column, row = low.int()
     width = size[1] + 2
-    ids = (row * width + column)[..., None] + torch.tensor([0, 1, width, width + 1]).to(column)
+    first = row.int() * width + column.int()
+    ids = torch.stack((first, first + 1, first + width, first + width + 1), -1)
     shares = torch.stack((up * left, up * right, down * left, down * right), -1)
     bags = ids.flatten(0, 1), shares.flatten(0, 1)
-    return F.embedding_bag(bags[0], table, per_sample_weights=bags[1], mode="sum").unflatten(0, row.shape)
+    return F.embedding_bag(bags[0], table, per_sample_weights=bags[1], mode="sum").unflatten(0, first.shape)
 
 
 def _rows(maps: Tensor) -> Tensor:

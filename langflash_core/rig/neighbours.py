@@ -50,9 +50,8 @@ def neighbours(
         return list(everyone(len(rig))[view])
     if by == "sight":
         return witnesses(rig, view, rig.points(view), most, settings=settings)
-    return _greedy(
-        *_worth(rig, view, settings=settings), settings.sources if most is None else most, settings=settings
-    )
+    worth, towards = (values.cpu() for values in _worth(rig, view, settings=settings))  # read one by one
+    return _greedy(worth, towards, settings.sources if most is None else most, settings=settings)
 
 
 def source_views(

@@ -121,7 +121,7 @@ class Rig:
 
     def some(self, views: Sequence[int]) -> "Rig":
         """Some of the photos, bit by bit."""
-        chosen = list(views)
+        chosen = torch.tensor(list(views), device=self.depths.device)
         errors = None if self.confidences is None else self.log_errors[chosen]
         photos = None if self.photos is None else self.photos[chosen]
         logs, viewmats, Ks = (values[chosen] for values in (self.log_depths, self.viewmats, self.Ks))

@@ -76,7 +76,8 @@ class Tokens:
 
     def views(self, keep: Sequence[int]) -> "Tokens":
         """Those of some views."""
-        return self.each(lambda hook: hook[:, list(keep)])
+        chosen = torch.tensor(list(keep), device=self.hooks[0].device)
+        return self.each(lambda hook: hook[:, chosen])
 
 
 def tokens_to_maps(tokens: Float[Tensor, "n _ C"], grid: tuple[int, int]) -> Float[Tensor, "n C h w"]:

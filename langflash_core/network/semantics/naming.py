@@ -105,7 +105,7 @@ def places(
         numbers = [
             *(high - low).clamp_min(0.01).log(), low[1] - floor, high[1] - floor, (low[0] + high[0]) / 2,
             (low[2] + high[2]) / 2, own.float().mean().clamp_min(1e-4).log(),
-            (own & border).sum() / own.sum(), up.new_tensor(1.0),
+            (own & border).sum() / own.sum(), torch.ones_like(floor),
         ]  # fmt: skip
         answer[k] = torch.stack(numbers)
     return answer

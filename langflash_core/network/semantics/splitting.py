@@ -135,16 +135,22 @@ def cluster(vectors: Float[Tensor, "X S"], rule: Splitting) -> Float[Tensor, "J 
 
 
 def _seeds(vectors: Tensor, count: int) -> Tensor:
-    """Up to `count` of the vectors, each drawn with the squared distance to those before it."""
+    """Up to `count` of the vectors, each drawn with the squared distance to those before it.
+
+    The largest of chance / e with e exponential, as `torch.multinomial` draws one: all e are drawn at once,
+    on the processor, so that every device draws the same and none waits for another.
+    """
     generator = torch.Generator().manual_seed(0)
     some = vectors[:: max(1, len(vectors) // SPLITTING.seeds_from)]
-    distances = torch.full_like(some[:, 0], torch.inf)
-    chosen = [0]
-    while len(chosen) < min(count, len(some)):
-        distances = distances.minimum((some - some[chosen[-1]]).square().sum(1))
-        chance = distances.clamp_min(1e-9).cpu()  # equal pixels still give a seed
-        chosen.append(int(torch.multinomial(chance, 1, generator=generator)))
-    return some[chosen]
+    waits = torch.empty(min(count, len(some)) - 1, len(some))
+    for own in waits:
+        own.exponential_(generator=generator)
+    distances, chosen = torch.full_like(some[:, 0], torch.inf), [some[:1]]
+    for own in waits.to(some):
+        distances = distances.minimum((some - chosen[-1]).square().sum(1))
+        chance = distances.clamp_min(1e-9)  # equal pixels still give a seed
+        chosen.append(some[(chance / own).argmax(0, keepdim=True)])
+    return torch.cat(chosen)
 
 
 def _settle(vectors: Tensor, centres: Tensor) -> tuple[Tensor, Tensor]:
