@@ -35,11 +35,13 @@ helps behind its semicolon.
 """
 
 # All is read in at first use: importing the package alone costs no torch. It settles how torch's threads
-# will wait (`threads.py`), unless the environment says that already.
+# will wait (`threads.py`), and that processors help Macs' cards (`devices.py`), unless the environment says
+# that already.
 
 from importlib import import_module
 from typing import TYPE_CHECKING
 
+from langflash_core.base.devices import let_processor_help
 from langflash_core.base.threads import wait_asleep
 
 if TYPE_CHECKING:
@@ -62,6 +64,7 @@ if TYPE_CHECKING:
 __version__ = "0.1.0"
 
 wait_asleep()
+let_processor_help()
 
 _HOMES = {
     "reconstruct": ("pipeline", "reconstruct"),

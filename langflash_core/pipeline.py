@@ -72,7 +72,7 @@ def reconstruct(
             (fx, fy, cx, cy) in pixels of the photos as given, the same for all or one per photo.
             Neither: EXIF, else an assumption with a warning.
         size: the network sees about size x size pixels per photo, whatever their shape.
-        precision: "float32"; "bfloat16", in the parts that bear it; "auto" takes bfloat16 on graphics
+        precision: "float32"; "bfloat16", in the parts that bear it; "auto" takes bfloat16 on CUDA
             cards and, for `full`, on processors that are quick at it.
         aggregation: how a group gets its vector: "lfa" (trained), "average" (of dense features),
             "crops" (CLIP on a cut-out; presets of its space); None: lfa where it has weights,
@@ -86,7 +86,7 @@ def reconstruct(
         gaussians: about so many, instead of as many as the detail has.
         viewmats: poses (V, 4, 4) of the photos, world to camera, in any world and unit: they are not
             sought, and the scene is in that world; preset mini. None: the first photo's camera is the world.
-        device: "auto" takes CUDA where there is one; "cpu"; "cuda".
+        device: "cuda", "mps" or "cpu"; "auto" takes the first of these that there is.
         keep: a folder for what is done of it: matches, each photo's depth, what the network found. The same
             photos and settings go on from there, on the same machine with as many threads to the same bits.
             `keeping.forget` clears it. None: nowhere.

@@ -19,6 +19,9 @@ from torch.nn import functional as F
 
 from langflash_core.rig.settings import FLATTENING, Flattening
 
+WITHOUT_DOUBLES = ("mps",)
+"""Devices that have no float64: there the processor fits."""
+
 
 def flatten_ripples(
     log_depths: Float[Tensor, "V H W"], log_errors: Float[Tensor, "V H W"], settings: Flattening = FLATTENING
@@ -61,7 +64,8 @@ def fitted_planes(
 
 def _halve_size(maps: Tensor) -> Tensor:
     """(V, H, W) -> (V, 1, h, w), float64, means of two by two: ripples are slower, and sums eat digits."""
-    return F.avg_pool2d(maps[:, None].double(), 2, ceil_mode=True)
+    own = maps.cpu() if maps.device.type in WITHOUT_DOUBLES else maps
+    return F.avg_pool2d(own[:, None].double(), 2, ceil_mode=True)
 
 
 def _mean(maps: Tensor, radius: int) -> Tensor:

@@ -4,11 +4,12 @@ import json
 from collections.abc import Callable
 from contextlib import suppress
 from dataclasses import asdict, fields, replace
+from functools import partial
 from pathlib import Path
 
 import numpy as np
 import torch
-from torch import Tensor
+from torch import Tensor, nn
 
 from langflash_core.base.keeping import Arrays, Keep, not_kept
 from langflash_core.base.records import FoundFocal, FoundLens
@@ -24,21 +25,35 @@ from langflash_core.types import Gaussians, Prediction, Views
 
 _SAID = "said"
 _OWN = "gaussians."
+_HELPED = "the graphics card could not run the network, so the processor did; choose --device cpu to skip it"
 _TENSORS = ("weights", "dictionary", "viewmats", "depths", "confidences", "Ks")
 
 
 def predictor(options: Options, tools: Tools, ahead: Ahead, run: Run) -> Callable[[Views], Prediction]:
     """Views to what the network finds in them, on the CPU; what `options.keep` holds is not done again."""
 
+    def found(views: Views, kept: Kept) -> Prediction:
+        predict = partial(_predict_scene, views, kept, tools, ahead, run)
+        return with_help(predict, tools.network) if options.device == "mps" else predict()
+
     def predicted(views: Views) -> Prediction:
         if options.keep is None:
-            return _predict_scene(views, not_kept, tools, ahead, run)
+            return found(views, not_kept)
         kept = keep_of(options.keep, views, _settings(options, tools), ahead.gone_on)
-        return prediction_of(
-            kept("prediction", lambda: arrays_of(_predict_scene(views, kept, tools, ahead, run)))
-        )
+        return prediction_of(kept("prediction", lambda: arrays_of(found(views, kept))))
 
     return predicted
+
+
+def with_help(predict: Callable[[], Prediction], network: nn.Module) -> Prediction:
+    """What `predict` finds; where the network's device cannot do something, on the processor. There the
+    network then stays: scenes after this one are not told again."""
+    try:
+        return predict()
+    except (RuntimeError, TypeError):  # no such operation, kind of number or memory
+        network.to("cpu")
+        found = predict()
+        return replace(found, warnings=(*found.warnings, _HELPED))
 
 
 def keep_of(folder: Path, views: Views, settings: tuple, found: list[str] | None = None) -> Keep:

@@ -4,12 +4,11 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-import torch
 from jaxtyping import Float
 from torch import Tensor
 
 from langflash_core.base.detail import DEFAULT_DETAIL, check_gaussians, chosen_detail
-from langflash_core.errors import InputError
+from langflash_core.base.devices import chosen_device
 from langflash_core.images.lens import Intrinsics
 
 
@@ -43,16 +42,3 @@ class Options:
             chosen_detail(self.detail)
         check_gaussians(self.gaussians)
         return replace(self, device=device)
-
-
-def chosen_device(name: str) -> str:
-    """ "cpu" or "cuda".
-
-    Raises:
-        InputError: there is no such device.
-    """
-    if name not in ("auto", "cpu", "cuda"):
-        raise InputError(f"the device '{name}' is unknown; choose auto, cpu or cuda")
-    if name == "cuda" and not torch.cuda.is_available():
-        raise InputError("there is no CUDA device that torch can use; choose --device cpu or auto")
-    return ("cuda" if torch.cuda.is_available() else "cpu") if name == "auto" else name

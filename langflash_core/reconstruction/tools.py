@@ -85,7 +85,8 @@ def _bfloat16(preset: str, precision: str, device: str) -> bool:
         )
     if precision != "auto":
         return precision == "bfloat16"
-    return device != "cpu" or (network_class(PRESETS[preset]).bfloat16_on_cpu and has_bfloat16())
+    by_itself = device == "cpu" and network_class(PRESETS[preset]).bfloat16_on_cpu and has_bfloat16()
+    return by_itself or device == "cuda"
 
 
 def _atoms(network: LangFlashNet, way: str | None, views: Views) -> Atoms | None:

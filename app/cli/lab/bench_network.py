@@ -25,13 +25,12 @@ def run(args: Namespace, out: TextIO) -> None:
         check_output_file(args.output, (".json",))
     import torch
 
+    from langflash_core.base.devices import chosen_device
     from langflash_core.base.memory import peak_memory_mb
     from langflash_core.lab.evaluation.speed import Plan, measure_network, speed_table
     from langflash_core.network import PRESETS
 
-    device = args.device if args.device != "auto" else ("cuda" if torch.cuda.is_available() else "cpu")
-    if device == "cuda" and not torch.cuda.is_available():
-        raise InputError("there is no CUDA device that torch can use; choose --device cpu or auto")
+    device = chosen_device(args.device)
     side = args.size or math.isqrt(PRESETS[args.preset].native_area)
     plan = Plan(tuple(args.views), tuple(args.atoms), args.repeats, side, not args.float32)
     with ProgressBar() as progress:

@@ -6,6 +6,7 @@ from pathlib import Path
 from typing import Any
 
 from langflash_core.base.detail import DEFAULT_DETAIL, DETAILS, FEWEST, MOST
+from langflash_core.base.devices import DEVICES
 from langflash_core.base.formats import AXES, COLOUR_MAPS
 
 from ..values import (
@@ -73,7 +74,7 @@ def add_network(command: argparse.ArgumentParser) -> None:
 
 def add_device(command: argparse.ArgumentParser) -> None:
     """What the network runs on."""
-    command.add_argument("--device", choices=("auto", "cpu", "cuda"), default="auto")
+    command.add_argument("--device", choices=DEVICES, default="auto")
 
 
 def add_film_part(command: argparse.ArgumentParser) -> None:

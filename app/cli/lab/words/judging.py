@@ -6,6 +6,7 @@ from ...values import above_zero, pixel_side, seed, whole_count
 from ...words.shared import (
     add_backend,
     add_description,
+    add_device,
     add_json,
     add_output,
     add_switch,
@@ -50,7 +51,7 @@ def add_bench_network(commands) -> None:
     command.add_argument("--size", type=pixel_side, metavar="PX", help="(default: 224; full: 256)")
     add_switch(command, "--float32", "leave bfloat16 out, which is slow where a CPU lacks it")
     add_switch(command, "--compile", "through torch.compile")
-    command.add_argument("--device", choices=("auto", "cpu", "cuda"), default="auto")
+    add_device(command)
     add_tables(command, "the numbers as .json")
 
 
