@@ -52,7 +52,8 @@ class Line:
 @dataclass(frozen=True)
 class Stats:
     """Figures of the status bar; the session refreshes them every frame. settling: a finer picture than the
-    one on show is being drawn. failing: it could not be, and is tried again."""
+    one on show is being drawn. failing: it could not be, and is tried again. memory: the most bytes that
+    were held so far, 0 where the system does not say."""
 
     frame_seconds: float = 0.0
     picture_seconds: float = 0.0
@@ -62,6 +63,7 @@ class Stats:
     passes: tuple[tuple[str, int], ...] = ()
     settling: bool = False
     failing: bool = False
+    memory: int = 0
 
 
 NO_STATS = Stats()

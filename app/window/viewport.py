@@ -14,6 +14,7 @@ import numpy as np
 from jaxtyping import UInt8
 
 from langflash_core.base.graphics import draws_in_software
+from langflash_core.base.memory import peak_memory_mb
 from langflash_core.errors import GraphicsError
 from langflash_core.geometry.poses import Pose, Vector
 from langflash_core.scene.changes import Change
@@ -328,6 +329,7 @@ class Viewport:
             () if renderer is None else tuple(sorted(renderer.passes.items())),
             self.settling,
             self.failing,
+            10**6 * (peak_memory_mb() or 0),
         )
 
     def release(self) -> None:

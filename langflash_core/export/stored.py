@@ -11,7 +11,7 @@ import numpy as np
 import torch
 
 from langflash_core.base.limits import GAUSSIANS
-from langflash_core.base.memory import free_memory
+from langflash_core.base.memory import check_room
 from langflash_core.errors import SceneFileError
 from langflash_core.export.settings import STORED
 from langflash_core.geometry.quaternions import unit_quats
@@ -56,7 +56,7 @@ class Gathering:
             SceneFileError: a file may not hold so many, or they do not fit into the memory that is free.
         """
         GAUSSIANS.check(most, name, SceneFileError)
-        _check_memory(most, num_bases, name)
+        check_room(most, 4 * most * (11 + 3 * num_bases), name, SceneFileError)
         shapes = ((3,), (4,), (3,), (), (num_bases, 3))
         self._rows = Rows(*(np.empty((most, *shape), np.float32) for shape in shapes))
         self._count = 0
@@ -82,17 +82,6 @@ class Gathering:
     def stored(self) -> Rows:
         """What was taken so far, not copied."""
         return self._rows.some(slice(self._count))
-
-
-def _check_memory(most: int, num_bases: int, name: str) -> None:
-    """Before the work: where memory runs out on the way, the system may end the program."""
-    needed, free = 4 * most * (11 + 3 * num_bases) * STORED.copies, free_memory()
-    if free is not None and needed > free:
-        sizes = f"take {needed / 1e9:.1f} GB to open, and {max(free, 0) / 1e9:.1f} GB are free"
-        raise SceneFileError(
-            f"{name} says that it holds {most:,} Gaussians: they {sizes}; close other programs, or open it "
-            "where there is more memory"
-        )
 
 
 def to_scene(

@@ -18,6 +18,7 @@ from jaxtyping import Shaped
 
 from langflash_core.base.files import write_atomically
 from langflash_core.base.limits import ATOMS, GAUSSIANS, HEADER, VIEWS
+from langflash_core.base.memory import check_room
 from langflash_core.errors import SceneFileError
 
 FORMAT, VERSION = "langflash-scene", 3
@@ -145,20 +146,47 @@ def _read_arrays(
     path: Path, stream: BufferedReader, entries: dict[str, dict]
 ) -> dict[str, Shaped[np.ndarray, "..."]]:
     """The tensors, each into memory of its own while other threads go on: safetensors copies all of them
-    under Python's lock, for which frames wait."""
-    arrays, end = {}, 0
+    under Python's lock, for which frames wait.
+
+    Raises:
+        SceneFileError: the header says something else than the bytes, or they do not fit into memory.
+    """
     try:
-        for name, entry in sorted(entries.items(), key=lambda pair: pair[1]["data_offsets"]):
-            start, stop = (int(offset) for offset in entry["data_offsets"])
-            shape, kind = tuple(int(side) for side in entry["shape"]), np.dtype(_TYPES[entry["dtype"]])
-            if start != end or min(shape, default=0) < 0 or stop - start != kind.itemsize * math.prod(shape):
-                raise ValueError(f"the bytes of {name} are not those of {entry['dtype']} {shape}")
-            arrays[name] = np.empty(shape, kind)
-            stream.readinto(_bytes_of(arrays[name]))
-            end = stop
+        layout = _layout(entries)
     except (ValueError, LookupError, TypeError, ArithmeticError) as error:
         raise damage_error(path, error) from error
+    arrays = {}
+    opened = sum(opened_bytes(name, math.prod(shape)) for name, (shape, _) in layout.items())
+    check_room(layout["means"][0][0] if "means" in layout else 0, opened, path.name, SceneFileError)
+    for name, (shape, kind) in layout.items():
+        arrays[name] = np.empty(shape, kind)
+        stream.readinto(_bytes_of(arrays[name]))
     return arrays
+
+
+def _layout(entries: dict[str, dict]) -> dict[str, tuple[tuple[int, ...], np.dtype]]:
+    """Shapes and types of the tensors, in the order of the file.
+
+    Raises:
+        ValueError, LookupError, TypeError: the header says something else than the bytes.
+    """
+    layout, end = {}, 0
+    for name, entry in sorted(entries.items(), key=lambda pair: pair[1]["data_offsets"]):
+        start, stop = (int(offset) for offset in entry["data_offsets"])
+        shape, kind = tuple(int(side) for side in entry["shape"]), np.dtype(_TYPES[entry["dtype"]])
+        if start != end or min(shape, default=0) < 0 or stop - start != kind.itemsize * math.prod(shape):
+            raise ValueError(f"the bytes of {name} are not those of {entry['dtype']} {shape}")
+        layout[name], end = (shape, kind), stop
+    return layout
+
+
+_OPENED = {"weight_ids": 8, "view_ids": 8, "levels": 1}
+_PHOTO = "photo_"
+
+
+def opened_bytes(name: str, count: int) -> int:
+    """That so many numbers of a field take in an opened scene: float32, numbers of others int64."""
+    return count * (1 if name.startswith(_PHOTO) else _OPENED.get(name, 4))
 
 
 def _bytes_of(values: Shaped[np.ndarray, "..."]) -> memoryview:

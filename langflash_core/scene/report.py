@@ -7,7 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from langflash_core.base.records import FoundLens, Guess, Record, World, check_light, world_to_json
-from langflash_core.scene.container import damage_error, read_container
+from langflash_core.scene.container import damage_error, opened_bytes, read_container
 from langflash_core.scene.doubts import told_warnings
 from langflash_core.scene.record import from_json
 from langflash_core.scene.settings import REPORT
@@ -25,7 +25,8 @@ def describe(scene: "Scene") -> dict:
     Returns:
         `gaussians, atoms, channels, weights_per_gaussian (mean), sh_degree, views, layers (how many photos
         have one of their own, or None), view_size, photos, preset, source (the splat file it came from, or
-        None), antialiased (trained to be drawn so), space, bytes {field: bytes, total}, bounding_box and
+        None), antialiased (trained to be drawn so), space, bytes {field: bytes, total} as a file has them,
+        opened_bytes (in memory), bounding_box and
         core_box {min, max} in scene units (None when empty), metric_scale (metres per unit or None), world
         (None, or as `Record` has it), counts,
         pruning (as `prune` left it, with `psnr_db` and `relevance_error` where they were measured),
@@ -232,6 +233,7 @@ def _document(
         "antialiased": known.antialiased,
         "space": space,
         "bytes": {**sizes, "total": sum(sizes.values())},
+        "opened_bytes": sum(opened_bytes(name, values.size) for name, values in arrays.items()),
         "bounding_box": _box(means, (0.0, 1.0)),
         "core_box": _box(means, REPORT.core),
         "metric_scale": known.metric_scale,

@@ -12,6 +12,7 @@ import safetensors.numpy
 import safetensors.torch
 import torch
 
+from langflash_core.base import memory
 from langflash_core.errors import OutputError, SceneFileError
 from langflash_core.export import export, read
 from langflash_core.scene import container
@@ -38,6 +39,26 @@ def scene() -> Scene:
 def path(scene, tmp_path):
     save(scene, tmp_path / "a.langflash")
     return tmp_path / "a.langflash"
+
+
+def test_what_does_not_fit_into_memory_is_refused_before_it_is_read(path, scene, monkeypatch):
+    opened = describe_file(path)["opened_bytes"]
+    for free, fits in ((2 * opened, True), (2 * opened - 1, False)):
+        monkeypatch.setattr(memory, "free_memory", lambda free=free: free)
+        if fits:
+            load(path)
+            continue
+        said = f"holds {len(scene.gaussians):,} Gaussians: .* to open, .* are free; close other programs, or "
+        with pytest.raises(SceneFileError, match=said):
+            load(path)
+    container.check_container(path)  # the header alone fits
+
+
+def test_a_scene_takes_in_memory_what_the_report_says(path):
+    opened = load(path)
+    held = [*vars(opened.gaussians).values(), *vars(opened.semantics).values(), *vars(opened).values()]
+    tensors = sum(value.nbytes for value in held if isinstance(value, torch.Tensor))
+    assert describe_file(path)["opened_bytes"] == tensors + sum(map(len, opened.photos))
 
 
 def test_a_check_reads_the_header_alone(path, monkeypatch):

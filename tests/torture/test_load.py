@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+from langflash_core.base import memory
 from langflash_core.base.memory import free_memory
 from langflash_core.errors import SceneFileError
 from langflash_core.export import stored
@@ -25,11 +26,11 @@ def test_many_atoms_and_phrases_are_answered(context):
 
 
 def test_what_does_not_fit_into_memory_is_refused_before_the_work(monkeypatch):
-    monkeypatch.setattr(stored, "free_memory", lambda: 10**9)
+    monkeypatch.setattr(memory, "free_memory", lambda: 10**9)
     with pytest.raises(SceneFileError, match=r"10,000,000 .* take 1\.1 GB to open, and 1\.0 GB are"):
         stored.Gathering(10_000_000, 1, "a.splat")
     stored.Gathering(1000, 1, "a.splat")
-    monkeypatch.setattr(stored, "free_memory", lambda: None)  # where the system does not say
+    monkeypatch.setattr(memory, "free_memory", lambda: None)  # where the system does not say
     stored.Gathering(1000, 1, "a.splat")
 
 

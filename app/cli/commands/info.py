@@ -7,12 +7,15 @@ from typing import Any, TextIO
 
 from langflash_core.base.files import readable_file
 from langflash_core.base.limits import LIMITS
+from langflash_core.base.memory import told_bytes
 from langflash_core.errors import InputError, SceneFileError
 
+from ..drawn import bytes_drawn
 from ..report import tell, write_json
 from ..sbom import bill_of_materials
 
 _SHOWS = 1 / 255  # the smallest step of an 8-bit picture
+_SIZES = ("file_bytes", "opened_bytes", "drawn_bytes")
 
 
 def run(args: Namespace, out: TextIO) -> None:
@@ -28,6 +31,7 @@ def run(args: Namespace, out: TextIO) -> None:
         **_described(args.scene, args.axes),
         "file_bytes": args.scene.stat().st_size,
     }
+    document["drawn_bytes"] = _drawn(document)
     return tell(args, document, _told(document), out)
 
 
@@ -53,6 +57,19 @@ def _described(path: Path, axes: str | None) -> dict[str, Any]:
     return describe(open_scene(path, axes))
 
 
+def _drawn(document: dict[str, Any]) -> int:
+    """Bytes that it takes where it is drawn."""
+    count = document["gaussians"]
+    weights = document["bytes"]["weight_values"] // max(1, 2 * count)  # float16
+    return bytes_drawn(count, (document["sh_degree"] + 1) ** 2, weights, document["layers"])
+
+
+def _memory_line(document: dict[str, Any]) -> str:
+    """ "14.6 MB on disk, 45.1 MB in memory, 51.9 MB more to draw it"."""
+    file, opened, drawn = (told_bytes(document[name]) for name in _SIZES)
+    return f"{file} on disk, {opened} in memory, {drawn} more to draw it"
+
+
 def _for_people(document: dict[str, Any]) -> dict[str, Any]:
     """With detail, lens, world and what was left out as a line each, none where there is nothing to say; with
     what pruning changed; without timings, where nobody knows them."""
@@ -68,10 +85,12 @@ def _for_people(document: dict[str, Any]) -> dict[str, Any]:
         "antialiased": document["antialiased"] or "",
         "layers": document["layers"] or "",
         "foreseen": "",  # a warning says what it means
+        **dict.fromkeys(_SIZES, ""),  # a line together
     }
     world = world_from_json(document["world"]) if document["world"] else None
     lines["world"] = world_line(world, document["metric_scale"])
-    return {name: lines.get(name, value) for name, value in document.items() if lines.get(name) != ""}
+    told = {name: lines.get(name, value) for name, value in document.items() if lines.get(name) != ""}
+    return {**told, "memory": _memory_line(document)}
 
 
 def _pruned(report: dict[str, Any] | None) -> dict[str, Any] | None:

@@ -5,11 +5,15 @@ from itertools import accumulate
 
 from imgui_bundle import imgui
 
+from langflash_core.base.memory import told_bytes
+
 from ..kit import theme, widgets
 from ..kit.look import Look
 from ..scene.near import FADING, degrees_from_photos, flown_past
 from ..scene.state import said as in_words
 from ..state import State
+
+_MUCH = 10**9  # bytes, from which on somebody may want to know; what is held now would change frame by frame
 
 
 def draw(state: State, look: Look) -> None:
@@ -58,6 +62,8 @@ def figures(state: State) -> list[str]:
             _count(there[0], state.editing.num_deleted),
             f"{there[1]} groups",
         ]
+        if stats.memory >= _MUCH:
+            said.append(f"up to {told_bytes(stats.memory)} of memory so far")
         hover = state.editing.hover
         if hover is not None and hover.point is not None:
             x, y, z = hover.point

@@ -356,6 +356,9 @@ def test_info(run, scene_file):
     assert document["views"] == 2 and document["file_bytes"] == scene_file.stat().st_size
     text = run("info", scene_file).out
     assert f"gaussians: {WIDTH * HEIGHT:,}" in text and "space: minilm" in text
+    sizes = tuple(f"{document[f'{name}_bytes'] / 1e6:.1f} MB" for name in ("file", "opened", "drawn"))
+    assert text.splitlines()[-1] == "memory: {} on disk, {} in memory, {} more to draw it".format(*sizes)
+    assert "_bytes" not in text and " bytes:" not in text
     assert document["timings"] is None and "timings" not in text
 
 

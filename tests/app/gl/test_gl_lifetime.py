@@ -1,6 +1,7 @@
 """Objects, errors, state: what is left behind when the renderer has been and gone."""
 
 import ctypes
+import math
 import mmap
 import random
 from dataclasses import replace
@@ -8,12 +9,18 @@ from functools import partial
 from pathlib import Path
 
 import pytest
+import torch
 
+from app.cli.drawn import MOST_LAYERS, bytes_drawn
 from app.cli.renderers import open_renderer
 from app.gl import SplatRenderer, offscreen_context, paints
 from app.gl.canvas import Canvas
 from app.gl.hardware import hardware_of
+from app.gl.layered import KEPT
+from app.gl.layout import DEFINES
+from app.gl.splats import SplatBuffers
 from app.gl.targets import gl_function
+from langflash_core.base.graphics import Programs
 from langflash_core.errors import GraphicsError
 from langflash_core.types import Scene
 from tests.app.gl.questions import question
@@ -36,6 +43,26 @@ def resident_megabytes() -> float:
     """Memory this process holds; 0 where the system does not say so in /proc."""
     statm = Path("/proc/self/statm")
     return int(statm.read_text().split()[1]) * mmap.PAGESIZE / 1e6 if statm.exists() else 0.0
+
+
+@pytest.mark.parametrize("degree", [0, 1, 3, 4])
+def test_a_scene_takes_on_the_card_what_is_told(gl, degree):
+    """Buffers and textures that stay; tables of weights are filled up to whole rows."""
+    scene = cloud(20_000, 5)
+    num_bases, opacities = (degree + 1) ** 2, scene.gaussians.opacities.clamp_min(0.1)
+    sh = torch.zeros(len(opacities), num_bases, 3)
+    scene = replace(scene, gaussians=replace(scene.gaussians, sh=sh, opacities=opacities))
+    programs = Programs(gl, "splat", DEFINES)
+    splats = SplatBuffers(gl, programs, scene)
+    made = [*splats._vertices._shapes, splats._vertices._harmonics, splats._vertices._tints]
+    made += [splats._order_buffer, splats.places]
+    held = sum(buffer.size for buffer in made) + 8 * math.prod(splats._textures._sparse.size)
+    splats.release()
+    programs.release()
+    told = bytes_drawn(len(opacities), num_bases, scene.semantics.weight_ids.shape[1], None)
+    assert told == pytest.approx(held, rel=0.01)
+    halves = bytes_drawn(len(opacities), num_bases, 5, 2 * KEPT)
+    assert halves == bytes_drawn(len(opacities) // 2, num_bases, 5, None) and MOST_LAYERS == KEPT
 
 
 @pytest.fixture(scope="module")

@@ -95,5 +95,9 @@ def test_a_finer_picture_on_its_way_is_told_in_the_status_bar() -> None:
     assert "refining ..." in figures(drawing)
     counted = replace(state, stats=replace(state.stats, passes=(("blend", 5),)))
     assert figures(counted) == figures(state), "counts of passes tell nobody anything"
+    large, small = (
+        replace(state, stats=replace(state.stats, memory=size)) for size in (1_540_000_000, 10**8)
+    )
+    assert "up to 1.5 GB of memory so far" in figures(large) and figures(small) == figures(state)
     failed = replace(state, stats=replace(state.stats, failing=True))
     assert any("refining failed" in text for text in figures(failed))
