@@ -1,6 +1,6 @@
 """Colours by name, as people see them under the light of a room.
 
-Colours are CIELAB under the room's own white: what is brightest in a picture, and not full of colour itself,
+Colours are CIELAB under the room's own white: what is brightest in a picture, and least full of colour itself,
 is taken for white (as walls and ceilings are), and every colour is scaled by it in linear light (von Kries).
 A name is a region of lightness L, chroma C and hue h with soft borders, so that a thing may be white and
 light at once. L in [0, 100]; h in degrees.
@@ -33,14 +33,14 @@ LOOKS: dict[str, Look] = {
     "white": Look((74, 200), (-100, 13)),
     "grey": Look((32, 76), (-100, 11)),
     "black": Look((-100, 27), (-100, 14)),
-    "red": Look((14, 66), (20, 300), (-8, 52)),
+    "red": Look((6, 66), (20, 300), (-8, 52)),
     "orange": Look((42, 90), (26, 300), (44, 78)),
     "brown": Look((12, 60), (9, 45), (34, 92)),
     "yellow": Look((50, 200), (20, 300), (78, 112)),
     "green": Look((12, 95), (10, 300), (112, 188)),
-    "turquoise": Look((25, 95), (10, 300), (170, 232)),
+    "turquoise": Look((25, 95), (10, 300), (170, 242)),
     "blue": Look((10, 92), (9, 300), (222, 306)),
-    "purple": Look((10, 80), (13, 300), (298, 345)),
+    "purple": Look((10, 90), (13, 300), (298, 345)),
     "pink": Look((52, 96), (11, 75), (325, 395)),
     "beige": Look((62, 96), (7, 32), (52, 108)),
     "golden": Look((40, 88), (26, 80), (66, 98)),
@@ -77,14 +77,19 @@ def room_white(rgb: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "3"]:
     brightness = light @ np.array(LOOK.luma)
     low, high = np.quantile(brightness, LOOK.bright)
     bright = light[(brightness >= low) & (brightness <= high)]
-    white = np.median(bright if len(bright) else light, axis=0)
+    bright = bright if len(bright) else light
+    colour = np.ptp(bright, axis=1) / np.maximum(bright.max(1), 1e-6)
+    white = np.median(bright[colour <= np.quantile(colour, LOOK.plain)], axis=0)
     top = max(float(white.max()), 1e-6)
     return np.maximum(white, top / LOOK.most_gain) * max(1.0, LOOK.dimmest / top)
 
 
 def lab(rgb: Float[np.ndarray, "*n 3"], white: Float[np.ndarray, "3"]) -> Float[np.ndarray, "*n 3"]:
-    """CIELAB (L, a, b) of sRGB colours, where `white`, in linear light, is white."""
-    relative = (linear(rgb) / white) @ _TO_XYZ.T / _WHITE
+    """CIELAB (L, a, b) of sRGB colours, where `white`, in linear light, is white. What is brighter in some
+    channel stands in more light, since nothing reflects more than all: it is scaled down to that."""
+    reflected = linear(rgb) / white
+    reflected = reflected / np.maximum(reflected.max(-1, keepdims=True), 1.0)
+    relative = reflected @ _TO_XYZ.T / _WHITE
     cut = 6 / 29
     f = np.where(relative > cut**3, np.cbrt(relative), relative / (3 * cut**2) + 4 / 29)
     x, y, z = np.moveaxis(f, -1, 0)
@@ -97,7 +102,20 @@ def looking(colours: Float[np.ndarray, "*n 3"], name: str) -> Float[np.ndarray, 
     Raises:
         KeyError: there is no such look in `LOOKS`.
     """
+    return _fitting(colours, LOOKS[name])
+
+
+def tinted(colours: Float[np.ndarray, "*n 3"], name: str) -> Float[np.ndarray, "*n"]:
+    """The same by hue alone, of what has one: in dim or misty light colours are dark or pale."""
     look = LOOKS[name]
+    if look.hue is None:
+        return looking(colours, name)
+    low, high = look.hue
+    hue = (low - LOOK.soft_h / 2, high + LOOK.soft_h / 2)
+    return _fitting(colours, Look(chroma=(LOOK.tint, look.chroma[1]), hue=hue))
+
+
+def _fitting(colours: Float[np.ndarray, "*n 3"], look: Look) -> Float[np.ndarray, "*n"]:
     lightness, chroma = colours[..., 0], np.hypot(colours[..., 1], colours[..., 2])
     well = _within(lightness, look.lightness, LOOK.soft_l) * _within(chroma, look.chroma, LOOK.soft_c)
     if look.hue is None:

@@ -17,7 +17,8 @@ from torch import Tensor
 
 from langflash_core.language.answers import world_points
 from langflash_core.language.grammar import Modifier, Reading
-from langflash_core.language.looks import LOOKS, lab, looking, room_white
+from langflash_core.language.looks import LOOKS, lab, looking, room_white, tinted
+from langflash_core.language.parting import called_part, wall_faces
 from langflash_core.language.relevance import CompiledQuery
 from langflash_core.language.settings import ANSWERING, NARROWING
 from langflash_core.language.things import AWAY, UP, Thing, gap, is_related
@@ -46,20 +47,29 @@ class Sight:
         return replace(self, relevance=relevance, limit=limit, likely=least)
 
     def things(self, head: str, limit: float) -> list[Thing]:
-        """What is connected and answers a head, as large as an answer has to be."""
-        return self.cut(head, self.relevance[head] >= limit)
+        """What is connected and answers a head, as large as an answer has to be; of walls each by itself."""
+        found = self.cut(head, self.relevance[head] >= limit)
+        if head not in _WALLS:
+            return found
+        return [face for each in found for face in self._apart(head, each, wall_faces(each))]
+
+    def _apart(self, head: str, thing: Thing, numbers: Int[np.ndarray, " m"]) -> list[Thing]:
+        """What of a thing has the same number, as large as an answer has to be."""
+        parts = (self._thing(head, thing.rows[numbers == number]) for number in np.unique(numbers))
+        return [part for part in parts if part.share >= ANSWERING.min_area]
+
+    def _thing(self, head: str, rows: Int[np.ndarray, " m"]) -> Thing:
+        sure = float(self.relevance[head][rows].mean())
+        return Thing(rows, self.points[rows], float(self.areas[rows].sum()), sure)
 
     def cut(self, head: str, members: Bool[np.ndarray, " n"]) -> list[Thing]:
         """The connected parts of some members."""
         numbers = self.parts(members)
         rows = np.flatnonzero(numbers >= 0)
         order = rows[np.argsort(numbers[rows], kind="stable")]
-        found = []
-        for own in np.split(order, np.flatnonzero(np.diff(numbers[order])) + 1):
-            share = float(self.areas[own].sum())
-            if len(own) and share >= ANSWERING.min_area:
-                found.append(Thing(own, self.points[own], share, float(self.relevance[head][own].mean())))
-        return found
+        split = np.split(order, np.flatnonzero(np.diff(numbers[order])) + 1)
+        parts = (self._thing(head, own) for own in split if len(own))
+        return [part for part in parts if part.share >= ANSWERING.min_area]
 
 
 @dataclass(frozen=True)
@@ -85,33 +95,58 @@ def choose(reading: Reading, sight: Sight, limit: float | None = None) -> Choice
 
 
 Chosen = tuple[list[Thing], str]
+_WALLS = ("wall", "walls")
 
 
 def _looking(things: list[Thing], modifier: Modifier, sight: Sight, head: str) -> Chosen:
-    """Things mostly called so; where none is, the one that stands out, as an orange ladder in dim light does;
-    else the parts of them that are. Crumbs do not count, alone or of a thing: what hangs on a wall makes it
-    no red wall."""
+    """Things mostly called so, or parts of them beside other colours; where none is, the one that stands out;
+    where none does, the same by hue, as an orange ladder in dim light is found; else the pixels that are.
+    Crumbs do not count, alone or of a thing: what hangs on a wall makes it no red wall."""
     chroma = np.hypot(sight.colours[:, 1], sight.colours[:, 2])
     if LOOKS[modifier.word].hue and np.quantile(chroma, NARROWING.most_colourful) < NARROWING.grey:
         return things, f"its picture has no colours, so nothing here can be told to be {modifier.word}"
-    well = [looking(sight.colours[each.rows], modifier.word) for each in things]
-    shares = np.array([float(each.mean()) for each in well])
-    if modifier.negated:
-        return [each for each, share in zip(things, shares, strict=True) if share < NARROWING.mostly], ""
+    for judged in (looking, tinted):
+        parts = _parted(things, sight, head, lambda colours: judged(colours, modifier.word))
+        well = [judged(sight.colours[each.rows], modifier.word) for each in parts]
+        shares = np.array([float(each.mean()) for each in well])
+        if modifier.negated:
+            return [each for each, share in zip(parts, shares, strict=True) if share < NARROWING.mostly], ""
+        if found := _called(parts, shares):
+            note = f"no {head} here is clearly {modifier.word}; this comes nearest"
+            return found, "" if judged is looking else note
+    members = np.zeros(len(sight.areas), bool)
+    for each in _seen_well(things):
+        if (looks := looking(sight.colours[each.rows], modifier.word) >= 0.5).mean() >= NARROWING.crumb:
+            members[each.rows[looks]] = True
+    found = sight.cut(head, members)
+    return found, "" if found else f"no {head} here looks {modifier.word}"
+
+
+def _called(things: list[Thing], shares: Float[np.ndarray, " t"]) -> list[Thing]:
+    """Those that are called so in enough of their surface, or the one that stands out."""
     most = max(each.share for each in things)
     seen = [row for row, each in enumerate(things) if each.share >= NARROWING.crumb * most]
     *others, best = sorted(seen, key=lambda row: shares[row])
     enough = max(NARROWING.mostly, NARROWING.hardly * float(shares[best]))
     if shares[best] >= enough:
-        return [each for each, share in zip(things, shares, strict=True) if share >= enough], ""
-    if others and shares[best] >= max(NARROWING.stands_out, 3 * shares[others].max()):
-        return [things[best]], ""
-    members = np.zeros(len(sight.areas), bool)
-    for row in seen:
-        if (looks := well[row] >= 0.5).mean() >= NARROWING.crumb:
-            members[things[row].rows[looks]] = True
-    found = sight.cut(head, members)
-    return found, "" if found else f"no {head} here looks {modifier.word}"
+        return [each for each, share in zip(things, shares, strict=True) if share >= enough]
+    stands_out = others and shares[best] >= max(NARROWING.stands_out, 3 * shares[others].max())
+    return [things[best]] if stands_out else []
+
+
+def _parted(
+    things: list[Thing], sight: Sight, head: str, well: Callable[[np.ndarray], np.ndarray]
+) -> list[Thing]:
+    """Things; of one that is called so in a part alone, that part and the rest."""
+    whole, called, rest = list[Thing](), np.zeros(len(sight.areas), bool), np.zeros(len(sight.areas), bool)
+    for each in things:
+        colours = sight.colours[each.rows]
+        part = called_part(each, colours, well(colours))
+        if part is None:
+            whole.append(each)
+        else:
+            called[each.rows[part]], rest[each.rows[~part]] = True, True
+    return [*whole, *sight.cut(head, called), *sight.cut(head, rest)]
 
 
 def _relating(things: list[Thing], modifier: Modifier, sight: Sight, head: str) -> Chosen:
@@ -160,8 +195,8 @@ _MEASURES: dict[str, Callable[[Thing], float]] = {
     "left": lambda thing: -thing.column,
     "right": lambda thing: thing.column,
     "middle": lambda thing: thing.column,
-    "upper": lambda thing: float(thing.middle[UP]),
-    "lower": lambda thing: -float(thing.middle[UP]),
+    "upper": lambda thing: thing.elevation,
+    "lower": lambda thing: -thing.elevation,
     "nearest": lambda thing: -thing.distance,
     "farthest": lambda thing: thing.distance,
 }

@@ -87,12 +87,16 @@ class Looks:
 
     bright: tuple[float, float] = (0.9, 0.98)
     """Quantiles of brightness between which a picture's white is sought: above are lamps."""
+    plain: float = 0.5
+    """Of those the share with least colour, by which white is told: a wooden table under a lamp is as bright."""
     most_gain: float = 2.0
     """Between two channels: a room lit by bulbs of 2700 K under a camera set to daylight has 1.9."""
     dimmest: float = 0.15
     """Linear; a white that is darker is not scaled further: nothing in the picture is white."""
     luma: tuple[float, float, float] = (0.2126, 0.7152, 0.0722)
     """Weights of linear red, green and blue in light (ITU-R BT.709)."""
+    tint: float = 5.0
+    """Chroma from which a colour has a hue at all: white walls under lamps of two kinds have up to 4."""
     soft_l: float = 12.0
     """Width of the border between two lightnesses, of 100: as those below, some 5 just noticeable
     differences."""
@@ -159,6 +163,33 @@ class Narrowing:
 
 
 NARROWING = Narrowing()
+
+
+@dataclass(frozen=True)
+class Parting:
+    """Things that are several as people speak (`language.parting`)."""
+
+    shade: float = 0.25
+    """What lightness counts beside CIELAB's a and b: white and its own shade differ by 35."""
+    another: float = 10.0
+    """Of these, from which two parts are of different colours."""
+    clearly: tuple[float, float] = (0.25, 0.5)
+    """How well a part is called so that is not, or is, where another is."""
+    cut: float = 0.15
+    """Of a thing, from which on such a part is one: less lies on it, or is a handle."""
+    most_places: int = 2000
+    """Places of a thing that are looked at,"""
+    around: int = 9
+    """and how many of them next to each other are called as one: within 4 % of its side."""
+    off: float = 0.04
+    """Of the distance from the eye: how far a wall's places lie off its plane."""
+    most_faces: int = 5
+    """Walls that are seen at once: four, and one of a niche."""
+    trials: int = 300
+    """Planes that are tried: one wall of five is found by two of its places but once in 200,000."""
+
+
+PARTING = Parting()
 
 
 @dataclass(frozen=True)

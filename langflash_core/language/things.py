@@ -77,6 +77,11 @@ class Thing:
         low, high = np.quantile(angles, RELATIONS.ends)
         return float(low), float(high)
 
+    @property
+    def elevation(self) -> float:
+        """Of its middle over the eye's level, radians: of two lamps at a ceiling the nearer is the upper."""
+        return float(np.arctan2(self.middle[UP], np.hypot(self.middle[RIGHT], self.middle[AWAY])))
+
     def away(self, first: float, last: float) -> float:
         """How far what lies in some directions is; all of it where nothing does."""
         angles = np.arctan2(self.points[:, RIGHT], self.points[:, AWAY])
@@ -107,6 +112,8 @@ def is_related(thing: Thing, relation: str, others: list[list[Thing]]) -> bool:
         others: the things of each word that the relation names, at least one of each; two words, or one of
             several things, for "between". "nearest to" and "farthest from" compare things: see `gap`.
     """
+    for other in (other for some in others for other in some if len(other.rows) < len(thing.rows)):
+        thing = thing.without(other) or other  # a wall is not what hangs on it, though it answers "wall", too
     apart = [[other.without(thing) for other in some] for some in others]
     others = [[other for other in some if other is not None] for some in apart]
     if not all(others):
@@ -191,10 +198,21 @@ def _under(thing: Thing, other: Thing) -> bool:
 
 
 def _beside(thing: Thing, other: Thing) -> bool:
-    """Near it, at about its height, and neither on top of it nor under it."""
+    """Near it, and neither on top of it nor under it: at about its height, or aside of it seen from above, as
+    a chair of the window whose sill is over its back."""
     near = max(RELATIONS.beside * min(thing.extent, other.extent), thing.touch)
+    if gap(thing, [other]) > near:
+        return False
     apart = max(thing.low[UP] - other.high[UP], other.low[UP] - thing.high[UP])
-    return bool(apart <= -thing.touch / 2) and gap(thing, [other]) <= near
+    return bool(apart <= -thing.touch / 2) or _aside(thing, other)
+
+
+def _aside(thing: Thing, other: Thing) -> bool:
+    """Whether most of one is not over or under the other."""
+    from scipy.spatial import KDTree
+
+    ground = [each.points[:, [RIGHT, AWAY]] for each in (thing, other)]
+    return bool(np.median(KDTree(ground[1]).query(ground[0])[0]) > thing.touch)
 
 
 def _inside(thing: Thing, other: Thing) -> bool:
@@ -211,13 +229,16 @@ def _right(thing: Thing, other: Thing) -> bool:
 
 
 def _before(thing: Thing, other: Thing) -> bool:
-    """In the way to the other: their directions meet, and there it is nearer to the viewer. A wall is as far
-    as it is behind the ladder, not as its middle is."""
+    """In the way to the other: their directions meet, and there it is nearer to the viewer, or touches what is
+    taller and wider. A wall is as far as it is behind the ladder, not as its middle is."""
     ends = max(thing.columns[0], other.columns[0]), min(thing.columns[1], other.columns[1])
     narrower = min(each.columns[1] - each.columns[0] for each in (thing, other))
     if ends[1] - ends[0] < RELATIONS.meets * narrower:
         return False
-    return thing.away(*ends) < other.away(*ends) - thing.touch / 2
+    if thing.away(*ends) < other.away(*ends) - thing.touch / 2:
+        return True
+    backed = other.low[UP] <= thing.middle[UP] <= other.high[UP] and other.sizes[UP] > thing.sizes[UP]
+    return bool(backed) and other.extent > 2 * thing.extent and gap(thing, [other]) <= thing.touch
 
 
 def _between(thing: Thing, one: Thing, two: Thing) -> bool:
