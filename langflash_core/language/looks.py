@@ -1,7 +1,7 @@
 """Colours by name, as people see them under the light of a room.
 
-Colours are CIELAB under the room's own white: what is brightest in a picture, and least full of colour itself,
-is taken for white (as walls and ceilings are), and every colour is scaled by it in linear light (von Kries).
+Colours are CIELAB under the room's own white: what is brightest in a picture, and has least colour itself, is
+taken for white (as walls and ceilings are), and every colour is scaled by it in linear light (von Kries).
 A name is a region of lightness L, chroma C and hue h with soft borders, so that a thing may be white and
 light at once. L in [0, 100]; h in degrees.
 """
@@ -40,7 +40,7 @@ LOOKS: dict[str, Look] = {
     "green": Look((12, 95), (10, 300), (112, 188)),
     "turquoise": Look((25, 95), (10, 300), (170, 242)),
     "blue": Look((10, 92), (9, 300), (222, 306)),
-    "purple": Look((10, 90), (13, 300), (298, 345)),
+    "purple": Look((10, 90), (13, 300), (292, 345)),
     "pink": Look((52, 96), (11, 75), (325, 395)),
     "beige": Look((62, 96), (7, 32), (52, 108)),
     "golden": Look((40, 88), (26, 80), (66, 98)),

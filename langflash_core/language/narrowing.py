@@ -106,12 +106,16 @@ def _looking(things: list[Thing], modifier: Modifier, sight: Sight, head: str) -
     if LOOKS[modifier.word].hue and np.quantile(chroma, NARROWING.most_colourful) < NARROWING.grey:
         return things, f"its picture has no colours, so nothing here can be told to be {modifier.word}"
     for judged in (looking, tinted):
-        parts = _parted(things, sight, head, lambda colours: judged(colours, modifier.word))
-        well = [judged(sight.colours[each.rows], modifier.word) for each in parts]
-        shares = np.array([float(each.mean()) for each in well])
+        well = judged(sight.colours, modifier.word)
+        parts = _parted(things, sight, head, well)
+        shares = np.array([float(well[each.rows].mean()) for each in parts])
+        if judged is tinted:  # of an orange ladder and a wall in its light the ladder is meant
+            colour = np.array([float(np.median(chroma[each.rows])) for each in parts])
+            best = colour[shares >= NARROWING.mostly].max(initial=NARROWING.grey)
+            shares = shares * np.minimum(colour / best, 1.0)
         if modifier.negated:
             return [each for each, share in zip(parts, shares, strict=True) if share < NARROWING.mostly], ""
-        if found := _called(parts, shares):
+        if parts and (found := _called(parts, shares)):
             note = f"no {head} here is clearly {modifier.word}; this comes nearest"
             return found, "" if judged is looking else note
     members = np.zeros(len(sight.areas), bool)
@@ -134,14 +138,11 @@ def _called(things: list[Thing], shares: Float[np.ndarray, " t"]) -> list[Thing]
     return [things[best]] if stands_out else []
 
 
-def _parted(
-    things: list[Thing], sight: Sight, head: str, well: Callable[[np.ndarray], np.ndarray]
-) -> list[Thing]:
+def _parted(things: list[Thing], sight: Sight, head: str, well: Float[np.ndarray, " n"]) -> list[Thing]:
     """Things; of one that is called so in a part alone, that part and the rest."""
     whole, called, rest = list[Thing](), np.zeros(len(sight.areas), bool), np.zeros(len(sight.areas), bool)
     for each in things:
-        colours = sight.colours[each.rows]
-        part = called_part(each, colours, well(colours))
+        part = called_part(each, sight.colours[each.rows], well[each.rows])
         if part is None:
             whole.append(each)
         else:

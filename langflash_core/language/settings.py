@@ -88,7 +88,7 @@ class Looks:
     bright: tuple[float, float] = (0.9, 0.98)
     """Quantiles of brightness between which a picture's white is sought: above are lamps."""
     plain: float = 0.5
-    """Of those the share with least colour, by which white is told: a wooden table under a lamp is as bright."""
+    """Of those the share with least colour, which tells white: a wooden table under a lamp is as bright."""
     most_gain: float = 2.0
     """Between two channels: a room lit by bulbs of 2700 K under a camera set to daylight has 1.9."""
     dimmest: float = 0.15

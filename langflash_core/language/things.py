@@ -211,8 +211,8 @@ def _aside(thing: Thing, other: Thing) -> bool:
     """Whether most of one is not over or under the other."""
     from scipy.spatial import KDTree
 
-    ground = [each.points[:, [RIGHT, AWAY]] for each in (thing, other)]
-    return bool(np.median(KDTree(ground[1]).query(ground[0])[0]) > thing.touch)
+    ground = KDTree(together([other])[:, [RIGHT, AWAY]])
+    return bool(np.median(ground.query(thing.points[:, [RIGHT, AWAY]])[0]) > thing.touch)
 
 
 def _inside(thing: Thing, other: Thing) -> bool:
@@ -229,8 +229,8 @@ def _right(thing: Thing, other: Thing) -> bool:
 
 
 def _before(thing: Thing, other: Thing) -> bool:
-    """In the way to the other: their directions meet, and there it is nearer to the viewer, or touches what is
-    taller and wider. A wall is as far as it is behind the ladder, not as its middle is."""
+    """In the way to the other: their directions meet, and there it is nearer to the viewer, or touches what
+    is taller and wider. A wall is as far as it is behind the ladder, not as its middle is."""
     ends = max(thing.columns[0], other.columns[0]), min(thing.columns[1], other.columns[1])
     narrower = min(each.columns[1] - each.columns[0] for each in (thing, other))
     if ends[1] - ends[0] < RELATIONS.meets * narrower:

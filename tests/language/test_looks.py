@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from langflash_core.language.looks import LOOKS, TONES, lab, linear, looking, room_white
+from langflash_core.language.looks import LOOKS, TONES, lab, linear, looking, room_white, tinted
 
 REFLECTING = {  # linear light, of a hundred, of paints and woods in daylight
     "white": (84, 84, 82), "grey": (24, 24, 24), "black": (3, 3, 3), "red": (38, 5, 5), "orange": (62, 22, 4),
@@ -41,6 +41,28 @@ def test_a_colour_keeps_its_name_under_any_light(name: str, light: str) -> None:
 def test_without_the_white_of_the_room_warm_light_has_other_names() -> None:
     shown = photographed(REFLECTING["white"], LIGHTS["warm"])
     assert looking(lab(shown, np.ones(3)), "white") < 0.5
+
+
+def test_a_wooden_table_in_the_light_is_not_taken_for_white() -> None:
+    """It is as bright as the walls, and more of what is bright is wood."""
+    wood = np.repeat(photographed((86, 66, 40), LIGHTS["day"]), 300, axis=0)
+    colours = lab(
+        photographed(REFLECTING["beige"], LIGHTS["day"]), room_white(np.vstack((room((1, 1, 1)), wood)))
+    )
+    assert looking(colours, "beige")[0] >= 0.5 > looking(colours, "white")[0]
+
+
+def test_what_stands_in_more_light_than_white_keeps_its_colour() -> None:
+    lilac = photographed((42, 22, 58), (2, 2, 2))
+    assert looking(lab(lilac, np.full(3, 0.4)), "purple")[0] >= 0.5
+
+
+def test_a_tint_is_a_hue_however_dark_or_pale() -> None:
+    dim_misty_grey = np.array([[22, 12, 13.0], [80, 6, 7.5], [60, 1, 1]])
+    assert (looking(dim_misty_grey, "orange") < 0.5).all()
+    assert tinted(dim_misty_grey, "orange").round().tolist() == [1, 1, 0]
+    assert (tinted(dim_misty_grey, "blue") == 0).all()
+    assert (tinted(dim_misty_grey, "grey") == looking(dim_misty_grey, "grey")).all()
 
 
 def test_linear_light_is_that_of_srgb() -> None:

@@ -67,6 +67,9 @@ ASKED = {
     '"red chair"': BOTH,
     "spider-man chair": BOTH,
     "chair behind the table": NONE,
+    "left wall": LEFT,
+    "wall on the right": RIGHT,
+    "second wall": BOTH,
 }
 
 
@@ -156,6 +159,50 @@ def two_ladders(orange: float, elsewhere: float) -> Sight:
 def test_the_one_that_stands_out_is_meant(orange: float, elsewhere: float, sizes: list[int]) -> None:
     kept = choose(read_phrase("orange ladder"), two_ladders(orange, elsewhere)).kept
     assert [len(each.rows) for each in kept] == sizes
+
+
+def cabinet(lower: tuple[float, float, float], upper: tuple[float, float, float]) -> Sight:
+    """A front of 40 x 40 places, as one thing, its lower half of one colour and its upper half of another;
+    every tenth place of both is a handle."""
+    up, right = np.divmod(np.arange(1600), 40)
+    colours = np.where((up < 20)[:, None], lower, upper)
+    colours[::10] = (70.0, 0.0, 0.0)
+    return Sight(
+        points=np.stack((right / 40, up / 40, np.full(1600, 2.0)), 1),
+        colours=colours,
+        areas=np.full(1600, 1 / 1600),
+        relevance={"cabinet": np.ones(1600)},
+        limit=0.9,
+        likely=0.8,
+        parts=lambda members: np.where(members, 0, -1),
+    )
+
+
+WOOD, PAINT, SHADED, DIM = (48.0, 8.0, 22.0), (95.0, 0.0, 2.0), (62.0, 0.0, 1.0), (30.0, 7.0, 7.0)
+
+
+@pytest.mark.parametrize(
+    ("phrase", "lower", "upper", "meant"),
+    [
+        ("wooden cabinet", WOOD, PAINT, "lower"),
+        ("white cabinet", WOOD, PAINT, "upper"),
+        ("cabinet that is not wooden", WOOD, PAINT, "upper"),
+        ("white cabinet", SHADED, PAINT, "both"),
+        ("wooden cabinet", WOOD, WOOD, "both"),
+        ("orange cabinet", DIM, PAINT, "lower"),
+        ("blue cabinet", WOOD, PAINT, "none"),
+    ],
+)
+def test_of_a_thing_of_two_colours_the_part_is_meant(phrase: str, lower, upper, meant: str) -> None:
+    kept = choose(read_phrase(phrase), cabinet(lower, upper)).kept
+    rows = np.isin(np.arange(1600), np.concatenate([each.rows for each in kept] or [[]]))
+    shares = {"lower": (1, 0), "upper": (0, 1), "both": (1, 1), "none": (0, 0)}[meant]
+    assert (rows[:800].mean(), rows[800:].mean()) == pytest.approx(shares, abs=0.06)
+
+
+def test_people_are_told_that_a_colour_is_but_a_tint() -> None:
+    choice = choose(read_phrase("orange cabinet"), cabinet(DIM, PAINT))
+    assert choice.note == "no cabinet here is clearly orange; this comes nearest"
 
 
 def test_by_cosine_too(ask) -> None:

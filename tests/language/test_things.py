@@ -35,7 +35,10 @@ CUSHION = box((-2.4, -2.0), (-0.75, -0.4), (2.2, 2.5))
 LADDER = box((-0.3, 0.3), (-1.5, 0.5), (4.7, 4.9))
 SIDE = box((2, 2), (-1.5, 1.1), (0.5, 5))
 WALLS = Thing(np.concatenate((SIDE.rows, WALL.rows)), np.concatenate((SIDE.places, WALL.places)))
+WINDOW = box((2.99, 3), (-0.6, 0.8), (2.4, 3.4))
+BY_WINDOW = box((2.4, 2.85), (-1.5, -0.65), (2.7, 3.15))
 TRUE = [
+    (BY_WINDOW, "beside", WINDOW),  # although its back ends below the sill
     (WALLS, "behind", LADDER),  # although its middle is nearer
     (LADDER, "in front of", WALLS),
     (CUP, "on", TABLE),
@@ -74,6 +77,8 @@ FALSE = [
     (CUP, "under", TABLE),
     (FAR_CHAIR, "beside", TABLE),
     (LAMP, "beside", TABLE),
+    (CUP, "beside", TABLE),
+    (TABLE, "beside", FLOOR),
     (WALL, "in front of", TABLE),
     (CHAIR, "in front of", TABLE),
     (SOFA, "behind", CHAIR),
@@ -121,3 +126,14 @@ def test_the_gap_is_the_distance_of_the_nearest_points() -> None:
 def test_one_point_is_a_thing() -> None:
     one = Thing(np.array([7]), np.array([[0.0, -0.74, 2.9]]))
     assert is_related(one, "on", [[TABLE]]) and not is_related(TABLE, "on", [[one]])
+
+
+@pytest.mark.parametrize("thing", [LADDER, PICTURE])
+def test_a_wall_is_behind_what_stands_or_hangs_at_it_though_it_answers_wall_too(thing: Thing) -> None:
+    both = Thing(np.concatenate((WALL.rows, thing.rows)), np.concatenate((WALL.places, thing.places)))
+    assert is_related(both, "behind", [[thing]]) and not is_related(TABLE, "behind", [[thing]])
+
+
+def test_the_nearer_of_two_lamps_at_a_ceiling_is_the_upper_one() -> None:
+    near, far = box((-0.2, 0.2), (0.9, 1.0), (1.5, 1.7)), box((-0.2, 0.2), (0.95, 1.05), (4, 4.2))
+    assert near.elevation > far.elevation > TABLE.elevation > box((0, 1), (-1.5, -0.75), (1, 2)).elevation
