@@ -95,8 +95,8 @@ class Looks:
     """Linear; a white that is darker is not scaled further: nothing in the picture is white."""
     luma: tuple[float, float, float] = (0.2126, 0.7152, 0.0722)
     """Weights of linear red, green and blue in light (ITU-R BT.709)."""
-    tint: float = 5.0
-    """Chroma from which a colour has a hue at all: white walls under lamps of two kinds have up to 4."""
+    tint: float = 7.0
+    """Chroma from which a colour has a hue: grey steel, and white walls under two kinds of lamps, have 5."""
     soft_l: float = 12.0
     """Width of the border between two lightnesses, of 100: as those below, some 5 just noticeable
     differences."""
@@ -175,7 +175,7 @@ class Parting:
     """Of these, from which two parts are of different colours."""
     clearly: tuple[float, float] = (0.25, 0.5)
     """How well a part is called so that is not, or is, where another is."""
-    cut: float = 0.15
+    cut: float = 0.08
     """Of a thing, from which on such a part is one: less lies on it, or is a handle."""
     most_places: int = 2000
     """Places of a thing that are looked at,"""

@@ -211,8 +211,10 @@ def _aside(thing: Thing, other: Thing) -> bool:
     """Whether most of one is not over or under the other."""
     from scipy.spatial import KDTree
 
-    ground = KDTree(together([other])[:, [RIGHT, AWAY]])
-    return bool(np.median(ground.query(thing.points[:, [RIGHT, AWAY]])[0]) > thing.touch)
+    places = together([other])[:, [RIGHT, AWAY]]
+    ground = KDTree(places)
+    spacing = float(np.median(ground.query(places, 2)[0][:, -1]))
+    return bool(np.median(ground.query(thing.points[:, [RIGHT, AWAY]])[0]) > thing.touch + 2 * spacing)
 
 
 def _inside(thing: Thing, other: Thing) -> bool:

@@ -2,6 +2,7 @@
 
 import json
 from pathlib import Path
+from typing import get_args
 
 import numpy as np
 import pytest
@@ -16,6 +17,7 @@ from langflash_core.lab.evaluation.phrases import (
     read_place,
     shares,
 )
+from langflash_core.language.grammar import Kind, read_phrase
 
 ASKED = Path(phrases.__file__).parent / "asked"
 SIZE = (60, 40)
@@ -69,6 +71,15 @@ def test_shares_are_of_what_is_there_and_of_what_is_not():
         "honest": 0.5, "claimed": 0.5, "confident": 0.25,
     }  # fmt: skip
     assert "| wrong | 100 % | b (0.95) |" in phrases_markdown("home", some[1:])
+
+
+def test_thirty_phrases_with_modifiers_of_every_kind():
+    places = [read_place(ASKED / f"{name}_modified.json") for name in ("kitchen", "workshop", "office")]
+    readings = [read_phrase(phrase) for place in places for phrase in place.phrases]
+    said = [modifier for reading in readings for modifier in reading.modifiers]
+    assert len(readings) == 30 and all(reading.narrows for reading in readings)
+    assert {each.kind for each in said} == set(get_args(Kind)) and any(each.negated for each in said)
+    assert all(len(frames) == 1 for place in places for frames in place.there.values())
 
 
 @pytest.mark.parametrize("name", ["kitchen", "workshop", "office"])
