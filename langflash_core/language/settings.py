@@ -179,8 +179,8 @@ class Parting:
     """Of a thing, from which on such a part is one: less lies on it, or is a handle."""
     most_places: int = 2000
     """Places of a thing that are looked at,"""
-    around: int = 9
-    """and how many of them next to each other are called as one: within 4 % of its side."""
+    around: int = 16
+    """and how many of them next to each other are called as one: within 5 % of its side."""
     off: float = 0.04
     """Of the distance from the eye: how far a wall's places lie off its plane."""
     most_faces: int = 5
