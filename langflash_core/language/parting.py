@@ -64,7 +64,7 @@ def wall_faces(thing: Thing) -> Int[np.ndarray, " m"]:
         offsets = (across * starts).sum(1)
         best = int((abs(ground[some] @ across.T - offsets) <= slack[some, None]).sum(0).argmax())
         own = (numbers < 0) & (abs(ground @ across[best] - offsets[best]) <= slack)
-        if own.mean() < PARTING.cut:
+        if own.mean() < PARTING.face:
             break
         numbers[own] = number
     known = _some(np.flatnonzero(numbers >= 0))

@@ -185,6 +185,8 @@ class Parting:
     """Of the distance from the eye: how far a wall's places lie off its plane."""
     most_faces: int = 5
     """Walls that are seen at once: four, and one of a niche."""
+    face: float = 0.15
+    """Of all walls, from which on a plane is one of them: less is a pillar, or a reveal."""
     trials: int = 300
     """Planes that are tried: one wall of five is found by two of its places but once in 200,000."""
 
