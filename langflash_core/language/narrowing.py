@@ -21,7 +21,7 @@ from langflash_core.language.looks import LOOKS, lab, looking, room_white, tinte
 from langflash_core.language.parting import called_part, wall_faces
 from langflash_core.language.relevance import CompiledQuery
 from langflash_core.language.settings import ANSWERING, NARROWING
-from langflash_core.language.things import AWAY, UP, Thing, gap, is_related
+from langflash_core.language.things import AWAY, UP, Thing, beside_others, gap, is_related
 from langflash_core.types import Camera, Frame
 
 
@@ -159,6 +159,7 @@ def _relating(things: list[Thing], modifier: Modifier, sight: Sight, head: str) 
         sign = 1 if modifier.word == "nearest to" else -1
         return [min(things, key=lambda each: sign * gap(each, others[0]))], ""
     found = [each for each in things if is_related(each, modifier.word, others) != modifier.negated]
+    found = found if modifier.negated else [beside_others(each, others) for each in found]
     return found, "" if found else f"no {head} here is {modifier}"
 
 

@@ -112,8 +112,7 @@ def is_related(thing: Thing, relation: str, others: list[list[Thing]]) -> bool:
         others: the things of each word that the relation names, at least one of each; two words, or one of
             several things, for "between". "nearest to" and "farthest from" compare things: see `gap`.
     """
-    for other in (other for some in others for other in some if len(other.rows) < len(thing.rows)):
-        thing = thing.without(other) or other  # a wall is not what hangs on it, though it answers "wall", too
+    thing = beside_others(thing, others)
     apart = [[other.without(thing) for other in some] for some in others]
     others = [[other for other in some if other is not None] for some in apart]
     if not all(others):
@@ -126,6 +125,14 @@ def is_related(thing: Thing, relation: str, others: list[list[Thing]]) -> bool:
     if relation == "with":
         return gap(thing, others[0]) <= thing.touch
     return any(_PAIRS[relation](thing, other) for other in others[0])
+
+
+def beside_others(thing: Thing, others: list[list[Thing]]) -> Thing:
+    """A thing without what smaller ones share with it, unless that is nearly all: what hangs on a wall is
+    none, though it answers "wall", too."""
+    for other in (other for some in others for other in some if len(other.rows) < len(thing.rows)):
+        thing = thing.without(other) or thing
+    return thing
 
 
 def gap(thing: Thing, others: list[Thing]) -> float:

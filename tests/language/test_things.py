@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from langflash_core.language.things import Thing, gap, is_related
+from langflash_core.language.things import Thing, beside_others, gap, is_related
 
 _RNG = np.random.default_rng(0)
 _FIRST = iter(range(0, 10**9, 10**4))
@@ -137,3 +137,13 @@ def test_a_wall_is_behind_what_stands_or_hangs_at_it_though_it_answers_wall_too(
 def test_the_nearer_of_two_lamps_at_a_ceiling_is_the_upper_one() -> None:
     near, far = box((-0.2, 0.2), (0.9, 1.0), (1.5, 1.7)), box((-0.2, 0.2), (0.95, 1.05), (4, 4.2))
     assert near.elevation > far.elevation > TABLE.elevation > box((0, 1), (-1.5, -0.75), (1, 2)).elevation
+
+
+def test_what_two_share_is_the_smaller_ones() -> None:
+    """The answer to "cabinet under the counter" ends where the counter begins."""
+    both = Thing(
+        np.concatenate((CABINET.rows, CUP.rows[:500])), np.concatenate((CABINET.places, CUP.places[:500]))
+    )
+    small = Thing(CUP.rows[:500], CUP.places[:500])
+    assert (beside_others(both, [[small]]).rows == CABINET.rows).all()
+    assert beside_others(small, [[both]]) is small and beside_others(both, [[LAMP]]) is both
