@@ -15,18 +15,18 @@ _ROW_TEXELS = 4096
 
 
 class Carried:
-    """ids, values: (N, J), a few atoms of each Gaussian with their weights."""
+    """ids, values: (N, J), a few atoms of each Gaussian with their weights. bits: as of `atom_bits`."""
 
     def __init__(self, ids: np.ndarray, values: np.ndarray, num_atoms: int):
         self.ids = ids
         self.values = values
         self.num_atoms = num_atoms
-        self._bits = atom_bits(ids, values, num_atoms)
+        self.bits = atom_bits(ids, values, num_atoms)
 
     def atoms_of(self, rows: np.ndarray, starts: np.ndarray) -> np.ndarray:
         """(runs, K) bool: atoms that Gaussians carry with a weight above 0, together in each run of `rows`,
         from `starts` on."""
-        carried = np.bitwise_or.reduceat(self._bits[rows], starts, axis=0)  # (runs, words)
+        carried = np.bitwise_or.reduceat(self.bits[rows], starts, axis=0)  # (runs, words)
         bits = np.unpackbits(carried.astype("<u8").view(np.uint8), axis=1, bitorder="little")
         return bits[:, : self.num_atoms].astype(bool)
 

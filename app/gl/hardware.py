@@ -12,6 +12,7 @@ from .processor.cell_maps import CellMaps
 from .processor.host import HostAnswers
 from .processor.sprites import Sprites
 from .shapes import MakeShapes, Quads
+from .splats import MakeSplats, SplatBuffers
 from .weights import MakeMaps, WeightMaps
 
 
@@ -19,13 +20,14 @@ from .weights import MakeMaps, WeightMaps
 class Hardware:
     """shapes: what Gaussians are drawn as. maps: how weight maps come about. answers: who multiplies them
     with phrases. blends_all: whether moving pictures of a scene of layers are blended of as many as resting
-    ones, and not of few and smaller ones (layered.py). defines: of all shaders."""
+    ones, and not of few and smaller ones (layered.py). defines: of all shaders. splats: who draws them."""
 
     shapes: MakeShapes
     maps: MakeMaps
     answers: MakeAnswers
     blends_all: bool
     defines: Mapping[str, float] = field(default_factory=dict)
+    splats: MakeSplats = SplatBuffers
 
 
 CARD = Hardware(Quads, WeightMaps, ShaderAnswers, blends_all=True)

@@ -136,7 +136,7 @@ class LayeredLevel:
     @property
     def depth_range(self) -> tuple[float, float]:
         """From the nearest to the farthest of its parts', of those that are in view."""
-        seen = [part for part in self.parts if len(part.splats.order)] or self.parts
+        seen = [part for part in self.parts if part.splats.num_chosen] or self.parts
         near, far = zip(*(part.depth_range for part in seen), strict=True)
         return min(near), max(far)
 

@@ -59,8 +59,7 @@ class Level:
                 self.exact = True
             self._camera, self._projected, self.order_key = key, False, new_name()
         if not self._projected:
-            if len(self.splats.order):
-                self.splats.project(camera)
+            self.splats.project(camera)
             self._projected, self.places_key = True, new_name()
 
     def _place(self) -> None:

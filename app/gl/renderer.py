@@ -35,8 +35,8 @@ from .layout import PHRASES_A_LAYER
 from .picture import DrawnPicture, Picture, StillPicture
 from .processor.still import Still
 from .question import Question
-from .scene import LiveScene, MakeSplats, Thinned
-from .splats import SplatBuffers
+from .scene import LiveScene, Thinned
+from .splats import MakeSplats
 from .targets import context_lives, read
 from .view import ViewTargets
 
@@ -67,14 +67,14 @@ class SplatRenderer:
         self,
         ctx: moderngl.Context,
         precision: Precision = "float16",
-        splats: MakeSplats = SplatBuffers,
+        splats: MakeSplats | None = None,
         canvas: Canvas | None = None,
         maps: Precision | None = None,
         hardware: Hardware | None = None,
     ):
         """
         Args:
-            splats: makes the buffers of a scene.
+            splats: makes the buffers of a scene; None: as `hardware` has it.
             canvas: of this context and precision, to share with other renderers; None: one of its own, of
                 `precision`, `maps` and `hardware` (canvas.py).
 
@@ -87,7 +87,7 @@ class SplatRenderer:
         self._ctx = ctx
         self._own_canvas = canvas is None
         self.canvas = Canvas(ctx, precision, maps, hardware) if canvas is None else canvas
-        self.splats = splats
+        self.splats = self.canvas.hardware.splats if splats is None else splats
         self.passes = self.canvas.painter.passes
         self.exact = True
         self._fill = False

@@ -1,13 +1,10 @@
 """What lives as long as the scene: its Gaussians by level of detail, their marks, what its photos see."""
 
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from functools import cached_property
 
-import moderngl
 import numpy as np
 
-from langflash_core.base.graphics import Programs
 from langflash_core.export.colours import atom_colours
 from langflash_core.geometry.nearness import Nearness
 from langflash_core.scene.changed import apply_changes
@@ -20,10 +17,7 @@ from .layered import LayeredLevel, Prepared
 from .level import Level
 from .painter import Painter
 from .photos import PhotoDepths
-from .shapes import MakeShapes
-from .splats import Drawable, SplatBuffers
-
-MakeSplats = Callable[[moderngl.Context, Programs, Scene | Drawable, MakeShapes], SplatBuffers]
+from .splats import Drawable, MakeSplats, SplatBuffers
 
 
 @dataclass(frozen=True)

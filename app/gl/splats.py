@@ -1,6 +1,6 @@
 """One scene's Gaussians on the GPU: sorted, projected, and their weights expanded, per camera."""
 
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
 
 import moderngl
@@ -89,6 +89,11 @@ class SplatBuffers:
         return self._ordering.order
 
     @property
+    def num_chosen(self) -> int:
+        """How many these are."""
+        return len(self.order)
+
+    @property
     def depth_range(self) -> tuple[float, float]:
         """Depths of the middle 96 % of the Gaussians that were chosen last, scene units."""
         return self._ordering.depth_range
@@ -152,40 +157,42 @@ class SplatBuffers:
 
     def project(self, camera: Camera) -> None:
         """Footprints and colours of the chosen Gaussians into `places`, in draw order."""
-        program = self._programs.get(
-            "project.vert",
-            defines={
-                "SH_DEGREE": self._vertices.degree,
-                "SH_VEC4S": self._vertices.sh_vec4s,
-                "TINTED": TINTED,
-                **self._defines,
-            },
-            varyings=("out_place", "out_shape", "out_colour"),
-        )
-        viewmat, _ = matrices(camera)
-        eye = -viewmat[:3, :3].T @ viewmat[:3, 3]
-        gain, offset = _PLAIN if camera.light is None else camera.light.cpu().numpy()
-        set_uniforms(
-            program,
-            viewmat=viewmat,
-            eye=eye,
-            eye_rest=eye - eye.astype(np.float32),
-            **lens(camera),
-            image_size=(float(camera.width), float(camera.height)),
-            light_gain=gain,
-            light_offset=offset,
-            tint_colours=np.array(TINTS),
-        )
+        if not len(self.order):
+            return
+        defines, uniforms = self._projection(camera)
+        varyings = ("out_place", "out_shape", "out_colour")
+        program = self._programs.get("project.vert", defines=defines, varyings=varyings)
+        set_uniforms(program, **uniforms)
         self._transform(program, self._vertices.content, self.places)
         self.shapes.measure(self.places, len(self.order), (camera.width, camera.height))
 
-    def _transform(self, program: moderngl.Program, content: list, out: moderngl.Buffer) -> None:
-        key = ("transform", program.glo)
+    def _projection(self, camera: Camera) -> tuple[dict[str, float], dict]:
+        """Defines and uniforms of project.glsl."""
+        viewmat, _ = matrices(camera)
+        eye = -viewmat[:3, :3].T @ viewmat[:3, 3]
+        gain, offset = _PLAIN if camera.light is None else camera.light.cpu().numpy()
+        defines = {"SH_DEGREE": self._vertices.degree, "SH_VEC4S": self._vertices.sh_vec4s, "TINTED": TINTED}
+        return {**defines, **self._defines}, {
+            "viewmat": viewmat,
+            "eye": eye,
+            "eye_rest": eye - eye.astype(np.float32),
+            **lens(camera),
+            "image_size": (float(camera.width), float(camera.height)),
+            "light_gain": gain,
+            "light_offset": offset,
+            "tint_colours": np.array(TINTS),
+        }
+
+    def _transform(
+        self, program: moderngl.Program, content: list, out: moderngl.Buffer, ordered: bool = True
+    ) -> None:
+        """ordered: the chosen Gaussians, in draw order; else all, row by row."""
+        key = ("transform", program.glo, ordered)
         if key not in self._vaos:
-            self._vaos[key] = self._ctx.vertex_array(
-                program, content, index_buffer=self._order_buffer, index_element_size=4
-            )
-        self._vaos[key].transform(out, mode=moderngl.POINTS, vertices=len(self.order))
+            index = {"index_buffer": self._order_buffer, "index_element_size": 4} if ordered else {}
+            self._vaos[key] = self._ctx.vertex_array(program, content, **index)
+        count = len(self.order) if ordered else self.num_gaussians
+        self._vaos[key].transform(out, mode=moderngl.POINTS, vertices=count)
 
     # --- pictures ---------------------------------------------------------------------------
 
@@ -257,6 +264,10 @@ class SplatBuffers:
         self._textures.release()
         self._vertices.release()
         self.num_gaussians = 0
+
+
+MakeSplats = Callable[[moderngl.Context, Programs, Scene | Drawable, MakeShapes], SplatBuffers]
+"""Makes the buffers of a scene for a context, drawn with these programs and shapes."""
 
 
 def _drawable(scene: Scene) -> tuple[Gaussians, np.ndarray]:

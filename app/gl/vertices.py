@@ -31,7 +31,7 @@ class Vertices:
         self._shapes = [buffer_of(ctx, values) for values in _shapes(gaussians)]
         self._harmonics = ctx.buffer(reserve=max(4, self._stride * len(rows)))
         self._write_harmonics(sh.numpy(), rows)
-        self._tints = buffer_of(ctx, np.zeros(len(rows), np.uint8))
+        self._tints = buffer_of(ctx, np.zeros(-4 * (-len(rows) // 4), np.uint8))  # whole words
 
     def _write_harmonics(self, sh: np.ndarray, rows: np.ndarray) -> None:
         for first in range(0, len(rows), _ROWS_AT_ONCE):
@@ -56,6 +56,16 @@ class Vertices:
         formats = ("4f", "4f", "3f", f"{4 * self.sh_vec4s}f", "1f1")
         names = ("in_mean", "in_quat", "in_scale", "in_sh", "in_tint")
         return list(zip((*self._shapes, self._harmonics, self._tints), formats, names, strict=True))
+
+    @property
+    def buffers(self) -> tuple[moderngl.Buffer, ...]:
+        """For project.comp: means, quaternions, scales, harmonics, tints."""
+        return (*self._shapes, self._harmonics, self._tints)
+
+    @property
+    def most_bytes(self) -> int:
+        """That any of them has of a Gaussian."""
+        return max(16, self._stride)
 
     def release(self) -> None:
         for buffer in (self._tints, self._harmonics, *self._shapes):

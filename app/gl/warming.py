@@ -17,8 +17,8 @@ from .canvas import Canvas
 from .display import Answer, Drawn
 from .layered import MOVING
 from .question import Question
-from .scene import LiveScene, MakeSplats
-from .splats import SplatBuffers
+from .scene import LiveScene
+from .splats import MakeSplats, SplatBuffers
 from .view import ViewTargets
 
 SIDE = 36  # pixels; no power of two: for textures with such sides Mesa compiles shaders of their own

@@ -120,7 +120,7 @@ class WeightMaps:
         self, splats: SplatBuffers, target: moderngl.Framebuffer, atoms: np.ndarray, first: int, count: int
     ) -> None:
         """One pass, of `count` layers of the atoms from place `first` on, over what is there."""
-        if not len(splats.order):
+        if not splats.num_chosen:
             return
         splats.splat_weights(atoms, first, count, target)
         self.painter.passes["weights"] += 1

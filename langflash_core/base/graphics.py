@@ -141,6 +141,7 @@ class Programs:
         self._folder = folder
         self._defines = dict(defines or {})
         self._made: dict[tuple, moderngl.Program] = {}
+        self._computed: dict[tuple, moderngl.ComputeShader] = {}
 
     def get(
         self,
@@ -160,14 +161,25 @@ class Programs:
             )
         return self._made[key]
 
+    def compute(self, name: str, defines: Mapping[str, float] | None = None) -> "moderngl.ComputeShader":
+        """The compute shader of a file in the folder, of OpenGL 4.3."""
+        defines = {**self._defines, **(defines or {})}
+        key = (name, tuple(sorted(defines.items())))
+        if key not in self._computed:
+            self._computed[key] = self._ctx.compute_shader(shader_source(f"{self._folder}/{name}", defines))
+        return self._computed[key]
+
     def release(self) -> None:
         """Give all programs back; the next `get` compiles again."""
-        for program in reversed(self._made.values()):
-            program.release()
-        self._made.clear()
+        for made in (self._computed, self._made):
+            for program in reversed(made.values()):
+                program.release()
+            made.clear()
 
 
-def set_uniforms(program: "moderngl.Program", **values: float | tuple | np.ndarray) -> None:
+def set_uniforms(
+    program: "moderngl.Program | moderngl.ComputeShader", **values: float | tuple | np.ndarray
+) -> None:
     """Set uniforms by name; those the compiler found unused are passed over.
 
     Arrays go as float32. Matrices (..., 4, 4) are given by rows, as they are written, and handed over

@@ -6,6 +6,8 @@ from app.gl import SplatRenderer
 from app.gl.answers import ShaderAnswers
 from app.gl.hardware import hardware_of
 from app.gl.processor.host import HostAnswers
+from app.gl.splats import SplatBuffers
+from app.gl.tiled.splats import COMPUTE, TiledSplats
 from langflash_core.language.relevance import CompiledQuery
 from langflash_core.types import Scene
 
@@ -40,9 +42,14 @@ def show(gl):
         renderer.release()
 
 
-@pytest.fixture(params=["shader", "host"])
-def queries(request, monkeypatch):
-    """Both places where phrases meet weight maps, whatever this machine would choose."""
-    answers = {"shader": ShaderAnswers, "host": HostAnswers}[request.param]
-    monkeypatch.setattr("app.gl.canvas.hardware_of", lambda ctx: replace(hardware_of(ctx), answers=answers))
+@pytest.fixture(params=["shader", "host", "tiled"])
+def queries(request, gl, monkeypatch):
+    """Both places where phrases meet weight maps, and splats drawn tile by tile, whatever this machine would
+    choose."""
+    answers = HostAnswers if request.param == "host" else ShaderAnswers
+    if request.param == "tiled" and gl.version_code < COMPUTE:
+        pytest.skip("OpenGL 4.3 is not here")
+    splats = TiledSplats if request.param == "tiled" else SplatBuffers
+    ways = {"answers": answers, "splats": splats}
+    monkeypatch.setattr("app.gl.canvas.hardware_of", lambda ctx: replace(hardware_of(ctx), **ways))
     return request.param

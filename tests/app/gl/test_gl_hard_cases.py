@@ -21,6 +21,7 @@ import pytest
 import torch
 
 from app.gl import SplatRenderer, offscreen_context
+from app.gl.canvas import Canvas
 from app.gl.splats import SplatBuffers
 from langflash_core.errors import GraphicsError
 from langflash_core.geometry.harmonics import SH_C0
@@ -50,12 +51,15 @@ def largest(left: torch.Tensor, right: torch.Tensor) -> torch.Tensor:
 
 
 class Watched:
-    """Makes splats for a renderer and keeps the last, so that its order can be looked at."""
+    """Makes splats for a renderer, as one would, and keeps the last, so that its order can be looked at."""
 
     made: SplatBuffers
 
+    def __init__(self, gl: moderngl.Context):
+        self._make = Canvas(gl).hardware.splats
+
     def __call__(self, *given) -> SplatBuffers:
-        self.made = SplatBuffers(*given)
+        self.made = self._make(*given)
         return self.made
 
 
@@ -248,7 +252,7 @@ def test_depths_from_1e_3_to_1e6(gl, precision, yaw):
     assert torch.equal(draw(gl, precision, hidden, seen).rgb, frame.rgb)
 
 
-def test_far_floaters_ruin_no_order(show, precision):
+def test_far_floaters_ruin_no_order(gl, show, precision):
     """Up to 1e30 away: 16-bit or shared-range sort keys would put all else in one bin."""
     near = cloud(600, 0, dtype=torch.float32).gaussians
     floaters = splats([(0.01 * z, 0.0, z) for z in np.geomspace(1e3, 1e30, 9)], 1.0, dtype=torch.float32)
@@ -259,7 +263,7 @@ def test_far_floaters_ruin_no_order(show, precision):
     )
     orders = []
     for gaussians in (near, both):
-        watched = Watched()
+        watched = Watched(gl)
         renderer = show(scene_of(gaussians), precision, splats=watched)
         renderer.draw(camera())
         orders.append(watched.made.order)
@@ -288,13 +292,13 @@ def test_of_equal_depths_the_first_is_in_front(gl, precision):
     within("shares", largest(frame.rgb[10, 10], torch.tensor([0.5, 0.25, 0.125])), STEP[precision])
 
 
-def test_equal_depths_stay_equal_in_any_view(show, precision):
+def test_equal_depths_stay_equal_in_any_view(gl, show, precision):
     """37 triples under a turned camera: in the order of the reference, the first of three in front."""
     g = torch.Generator().manual_seed(2)
     places = torch.rand(37, 3, generator=g) - 0.5 + torch.tensor([0.0, 0.0, 2.0])
     means = [tuple(row) for row in places.repeat_interleave(3, 0).tolist()]
     gaussians = splats(means, 0.05, 0.9, [RED, GREEN, BLUE] * 37, torch.float32)
-    watched = Watched()
+    watched = Watched(gl)
     renderer = show(scene_of(gaussians), precision, splats=watched)
     for yaw in (0.1, 0.2, 0.3):
         seen = camera(pose=turned(yaw, (0.1, 0.0, 0.2)))
