@@ -115,6 +115,12 @@ class SplatRenderer:
         if self._scene is not None and self._scene.scene is scene:
             self._scene.give(share, thinned)
 
+    def draw_with(self, splats: MakeSplats) -> None:
+        """Draw by other buffers from the next picture on."""
+        self.splats = splats
+        if self._scene is not None:
+            self._scene.draw_with(splats)
+
     def upload(self, camera: Camera, share: float = 1.0, moving: bool = False, late: bool = False) -> bool:
         """Bring what a picture so drawn lacks to the card, one layer of the scene at the most, and find its
         order beside the frames; whether all of it is there."""

@@ -50,6 +50,7 @@ class LiveScene:
         self._changes: tuple[Change, ...] = ()
         self._photos: dict[bool, PhotoDepths] = {}  # by whether each sees its own Gaussians alone
         self._levels: dict[float, Prepared] = {}  # by share of the Gaussians
+        self._thinned: dict[float, Thinned] = {}  # that these were made of
         self._next: dict[float, Thinned] = {}  # to come in place of those
         self._past: list[Prepared] = []  # which the picture on show may still need
         self._near: Nearness | None = None
@@ -98,6 +99,11 @@ class LiveScene:
             self._next[share] = thinned
         else:
             self._make(share, thinned)
+
+    def draw_with(self, make_splats: MakeSplats) -> None:
+        """Make every level anew, of other buffers, as its next picture comes."""
+        self._make_splats = make_splats
+        self._next = {**self._thinned, **self._next}
 
     def forget_past(self) -> None:
         """Give levels back in whose place others came, once another picture is on show."""
@@ -149,6 +155,7 @@ class LiveScene:
 
     def _make(self, share: float, thinned: Thinned) -> None:
         scene, rows = thinned.scene, thinned.rows
+        self._thinned[share] = replace(thinned, drawable=None)
         if scene.layered and self.nearness().views:
             level = LayeredLevel(scene, rows, self._level_of, self.nearness)
         else:

@@ -88,6 +88,7 @@ class TiledSplats(SplatBuffers):
 
     def project(self, camera: Camera) -> None:
         """Footprints, colours, order and lists of tiles, on the card."""
+        self.shapes.forget()
         self._tiled = not self.num_gaussians or self._lists.find(
             camera, self._projection(camera), self._exact
         )

@@ -37,13 +37,14 @@ vec3 coefficient(int base) {
 
 shared uint own_seen, own_pairs;
 
-// Columns and rows before which the box begins and ends; none where it is broken.
+// Columns and rows before which the box begins and ends; none where it is broken or beside the image.
 uvec4 tiles_of(vec2 centre, vec2 extent) {
     if (any(isnan(centre + extent)) || any(isinf(centre))) return uvec4(0u);
-    vec2 last = vec2(grid);
-    vec2 low = clamp(floor((centre - extent) / float(TILE)), vec2(0.0), last);
-    vec2 high = clamp(floor((centre + extent) / float(TILE)) + 1.0, vec2(0.0), last);
-    return uvec4(low, max(high, low));
+    vec2 low = centre - extent, high = centre + extent;
+    if (any(lessThan(high, vec2(0.0))) || any(greaterThan(low, image_size))) return uvec4(0u);
+    vec2 last = vec2(grid) - 1.0;
+    return uvec4(clamp(floor(low / float(TILE)), vec2(0.0), last),
+                 clamp(floor(high / float(TILE)), vec2(0.0), last) + 1.0);
 }
 
 uint put() {
