@@ -35,7 +35,7 @@ LINE = 120
 DOCUMENTS = tuple(WORDS)
 TOPS = ("app", "langflash_core", "shaders", "assets", "tests", ".github", ".ci")
 TO_BE_MADE = re.compile(r"NAME")  # of recipes
-SOURCES = ("*.py", "*.frag", "*.vert", "*.glsl")
+SOURCES = ("*.py", "*.frag", "*.vert", "*.comp", "*.glsl")
 DOTTED = re.compile(r"(?<![\w./-])(?:langflash_core|app)(?:\.[A-Za-z_]\w*)+(?![\w/(]*/)")
 # Options of everything, of pytest here, of torchrun, of Biome.
 ELSEWHERE = {"--help", "--nothing-missing", "--nproc-per-node", "--write"}

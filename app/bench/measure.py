@@ -20,6 +20,7 @@ from langflash_core.types import Camera, Scene
 from ..gl import SplatRenderer
 from ..gl.canvas import Canvas
 from ..gl.processor.still import draw_still
+from ..gl.tiled.splats import TiledSplats
 from .cases import Case
 from .errors import Errors, View, errors_of, true_view
 from .modes import DEFAULT, Mode
@@ -140,7 +141,8 @@ class _Bench:
         shared = (mode.precision, mode.shrink)
         if shared not in self._canvases:
             self._canvases[shared] = Canvas(self.ctx, mode.precision)
-        renderer = SplatRenderer(self.ctx, mode.precision, canvas=self._canvases[shared])
+        splats = TiledSplats if mode.tiled else None
+        renderer = SplatRenderer(self.ctx, mode.precision, splats, canvas=self._canvases[shared])
         renderer.set_scene(self._scenes[_scene_key(mode)])
         return renderer
 
@@ -152,7 +154,7 @@ class _Bench:
 
 
 def _renderer_key(mode: Mode) -> tuple:
-    return mode.precision, mode.shrink, *_scene_key(mode)
+    return mode.precision, mode.shrink, mode.tiled, *_scene_key(mode)
 
 
 def _scene_key(mode: Mode) -> tuple:

@@ -16,6 +16,7 @@ class Mode:
     axis: what is decided. name: how. precision: of the targets. kept: weights per Gaussian, None: all
     that the scene has. share: of the Gaussians, the others widened. fast: relevance from numbers
     splatted beside the colour. shrink: of the picture's sides.
+    tiled: tile by tile, by compute shaders of OpenGL 4.3 (app/gl/tiled/).
     still: drawn on the processor, as the window does where OpenGL runs there too (app/gl/processor/still.py).
     colours: whether the picture's colours may differ from the default's, not its answers alone.
     """
@@ -29,6 +30,7 @@ class Mode:
     shrink: int = 1
     colours: bool = False
     still: bool = False
+    tiled: bool = False
 
     def scene(self, scene: Scene) -> Scene:
         """The scene as this mode draws it: fewer Gaussians, or the largest weights of each, renormalised."""
@@ -54,17 +56,21 @@ MODES = (
     Mode("weights", "m = 8", kept=8),
     Mode("resolution", "half resolution", shrink=2, colours=True),
     Mode("detail", "quarter of Gaussians", share=0.25, colours=True),
+    Mode("rasteriser", "tiles by compute shaders", tiled=True, colours=True),
     Mode("rasteriser", "tiles on the processor", still=True, colours=True),
     Mode("rasteriser", "such tiles at half resolution", still=True, shrink=2, colours=True),
 )
 AXES = tuple(dict.fromkeys(mode.axis for mode in MODES[1:]))
 
 
-def modes_for(scene: Scene, axes: Collection[str] = AXES) -> tuple[Mode, ...]:
-    """The default first, then the modes of these axes that differ from it on this scene."""
+def modes_for(scene: Scene, axes: Collection[str] = AXES, computes: bool = True) -> tuple[Mode, ...]:
+    """The default first, then the modes of these axes that differ from it on this scene. computes: whether
+    OpenGL has compute shaders."""
     stored = scene.semantics.weight_ids.shape[1]
     return DEFAULT, *(
-        mode for mode in MODES[1:] if mode.axis in axes and (mode.kept is None or mode.kept < stored)
+        mode
+        for mode in MODES[1:]
+        if mode.axis in axes and (mode.kept is None or mode.kept < stored) and computes >= mode.tiled
     )
 
 

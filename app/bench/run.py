@@ -2,6 +2,7 @@
 
 from collections.abc import Collection, Sequence
 
+from langflash_core.base.graphics import COMPUTE
 from langflash_core.base.running import Progress
 
 from ..gl import offscreen_context
@@ -29,7 +30,7 @@ def measured_cases(cases: Sequence[Case], axes: Collection[str] | None, progress
             def told(stage: str, share: float, number: int = number) -> None:
                 progress(stage, (number + share) / len(cases))
 
-            modes = modes_for(case.scene, axes or AXES)
+            modes = modes_for(case.scene, axes or AXES, context.version_code >= COMPUTE)
             results.append(measure(context, case, modes, told))
         return document(machine(context), results)
     finally:

@@ -155,8 +155,13 @@ def open_window(size: tuple[int, int]):
 
 
 def _create(size: tuple[int, int]):
+    """Of OpenGL 4.3 where that is: drivers give no more than is asked for."""
+    return _created(size, 4) or _created(size, 3)
+
+
+def _created(size: tuple[int, int], major: int):
     hints = {
-        glfw.CONTEXT_VERSION_MAJOR: 3,
+        glfw.CONTEXT_VERSION_MAJOR: major,
         glfw.CONTEXT_VERSION_MINOR: 3,
         glfw.OPENGL_PROFILE: glfw.OPENGL_CORE_PROFILE,
         glfw.OPENGL_FORWARD_COMPAT: True,

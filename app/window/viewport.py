@@ -60,6 +60,7 @@ class Viewport:
         self._stand = Stand()
         self._adjusting = False  # what is drawn changes with every frame
         self._fresh = False  # a scene has just been taken
+        self._wanted, self._way = "measured", ""  # how splats are drawn: as preferred, and as they are
         self._awaited: tuple[int, Scene, Governor] | None = None  # a large scene, whose share is to come
         self._around: Around | None = None  # where the share of a huge scene was chosen
         self._choosing = False  # it anew, on the worker's thread
@@ -72,7 +73,24 @@ class Viewport:
 
             make = moving_renderer if draws_in_software(self._ctx) else SplatRenderer
             self._renderer = make(self._ctx)
+            self._choose(self._renderer)
         return self._renderer
+
+    def draw_with(self, wanted: str) -> None:
+        """How to draw splats from the next picture on, one of `preferences.RASTERISERS`."""
+        self._wanted = wanted
+        if self._renderer is not None:
+            self._choose(self._renderer)
+
+    def _choose(self, renderer: "SplatRenderer") -> None:
+        from ..gl.tiled.trial import chosen, maker
+
+        way = chosen(self._ctx, self._wanted)
+        if way != self._way:
+            self._way = way
+            renderer.draw_with(maker(self._ctx, way))
+            if self.picture is not None:
+                self.picture.easel.drawn = None
 
     # --- what to show -----------------------------------------------------------------------
 
@@ -324,7 +342,7 @@ class Viewport:
             frame_seconds,
             0.0 if easel is None else easel.seconds,
             (0, 0) if easel is None else easel.size,
-            card,
+            f"{card}, {self._way}" if self._way else card,
             (0.0, 1.0) if renderer is None else renderer.depth_range,
             () if renderer is None else tuple(sorted(renderer.passes.items())),
             self.settling,

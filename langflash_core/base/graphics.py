@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     import moderngl
 
 OPENGL = 330  # the version needed, 100 times
+COMPUTE = 430  # that of compute shaders, which is asked for first: drivers may give no more than that
 _INCLUDE = re.compile(r'^#include "([\w.]+)"$', re.MULTILINE)
 _MATRIX = 0x8B5C  # GL_FLOAT_MAT4
 _SOFTWARE = ("llvmpipe", "softpipe", "swr", "software rasterizer", "apple software renderer")
@@ -41,7 +42,10 @@ def offscreen_context() -> "moderngl.Context":
         import moderngl
     settings: dict[str, Any] = {"backend": "egl"} if sys.platform.startswith("linux") else {}
     try:
-        context = moderngl.create_context(require=OPENGL, standalone=True, **settings)
+        try:
+            context = moderngl.create_context(require=COMPUTE, standalone=True, **settings)
+        except Exception:  # as below
+            context = moderngl.create_context(require=OPENGL, standalone=True, **settings)
         context.gc_mode = None  # pyright: ignore[reportAttributeAccessIssue] - owners release
         bound_framebuffer(context)
     except Exception as error:  # glcontext raises bare Exception whatever went wrong

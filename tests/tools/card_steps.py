@@ -22,7 +22,7 @@ from app.bench.generated import phrases
 from app.bench.machine import host
 from app.bench.measure import _Bench, _times
 from app.bench.modes import DEFAULT, MODES
-from langflash_core.base.graphics import offscreen_context
+from langflash_core.base.graphics import COMPUTE, offscreen_context
 from langflash_core.language.relevance import relevance_maps
 from langflash_core.splat import NEAR, rasterize, view_colours
 from langflash_core.types import Camera, Gaussians
@@ -93,7 +93,8 @@ def pictures(folder: Path, quick: bool) -> dict:
     context, rows = _context(), []
     info = context.info
     told = {"renderer": info["GL_RENDERER"], "driver": info["GL_VERSION"], "frames": frames}
-    modes = (DEFAULT, next(mode for mode in MODES if mode.fast))
+    tiled = [mode for mode in MODES if mode.tiled and context.version_code >= COMPUTE]
+    modes = (DEFAULT, next(mode for mode in MODES if mode.fast), *tiled)
     for size in sizes:
         for number in (1, cases.MAX_PHRASES):
             case = cases.synthetic_case(count, atoms, size, frames, number)

@@ -16,7 +16,6 @@ from ..splats import Drawable, SplatBuffers
 from ..targets import drawing
 from .lists import HIDDEN, TILE, TileLists
 
-COMPUTE = 430  # the version needed, 100 times
 STOP = 2**-24
 """Transmittance below which a pixel is full: what lies behind changes no float32 alpha any more."""
 
@@ -31,10 +30,8 @@ class TiledSplats(SplatBuffers):
         programs: Programs,
         scene: Scene | Drawable,
         shapes: MakeShapes = Quads,
-        reach: float | None = None,
     ):
-        """As of `SplatBuffers`."""
-        super().__init__(ctx, programs, scene, shapes, reach)
+        super().__init__(ctx, programs, scene, shapes)
         self._lists = TileLists(ctx, programs, self._vertices, self.num_gaussians)
         self._exact = True  # what is drawn next, or was last
         self._tiled = True

@@ -15,7 +15,7 @@ from ..kit.look import Look
 from ..state import State
 from . import commands as keep
 from . import preferences
-from .preferences import SPEEDS, THEMES
+from .preferences import RASTERISERS, SPEEDS, THEMES
 
 _LABELS = 190.0  # design pixels
 _EDITS_OFFER, _ANSWER, _NAME = 470.0, 108.0, 180.0  # design pixels wide; its buttons; a scene's name
@@ -26,6 +26,10 @@ _DETAIL_TIP = (
     "How fine the next scene will be\nnormal: about 240,000 Gaussians from two photos\n"
     "high: 1.6 times as many, slower to draw\nlow: a third, quicker to draw"
 )
+_DRAWING_TIP = (
+    "How Gaussians are drawn; pictures look the same\nmeasured: the quicker way on this graphics card\n"
+    "quads: works everywhere\ntiles: needs OpenGL 4.3"
+)
 
 
 def draw_settings(state: State, look: Look) -> list[do.Command]:
@@ -35,6 +39,7 @@ def draw_settings(state: State, look: Look) -> list[do.Command]:
         ("Theme", "theme", [(name.capitalize(), name) for name in THEMES], ""),
         ("Colour map", "colormap", [(name, name) for name in COLOUR_MAPS], ""),
         ("Detail of new scenes", "detail", [(name.capitalize(), name) for name in DETAILS], _DETAIL_TIP),
+        ("Drawing", "rasteriser", [(name.capitalize(), name) for name in RASTERISERS], _DRAWING_TIP),
         ("Interface size", "scale", [(f"{scale:.0%}", scale) for scale in _SIZES], ""),
     ):
         _label(label, look)

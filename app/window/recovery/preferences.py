@@ -21,6 +21,8 @@ from .locks import one_at_a_time
 
 MOST_RECENT = 10
 THEMES = ("dark", "light")
+RASTERISERS = ("measured", "quads", "tiles")
+"""Ways to draw splats: the one that a trial on the graphics card found to be quicker, or always that one."""
 SCALES = (0.75, 2.0)
 SPEEDS = (0.2, 5.0)
 PANEL_WIDTHS = (300.0, 560.0)  # design pixels
@@ -29,14 +31,14 @@ _PLACES = 20_000  # pixels; beyond this a window position is no position
 
 @dataclass(frozen=True)
 class Preferences:
-    """theme: of THEMES. colormap: of heat-maps. scale: of the interface, on top of the monitor's. speed: of
-    flying, a factor. touch_pad: two fingers turn, with Ctrl they zoom. photos_in_space: the cameras' frusta
-    are drawn. near_photos: the picture fades, and moves slow down, where no photo looked from about
-    there. fill_gaps: it shows what is around its gaps. floor_grid: squares of a metre on the floor.
+    """theme: of THEMES. colormap: of heat-maps. scale: of the interface, on top of the monitor's. speed:
+    of flying, a factor. touch_pad: two fingers turn, with Ctrl they zoom. photos_in_space: the cameras'
+    frusta are drawn. near_photos: the picture fades, and moves slow down, where no photo looked from
+    about there. fill_gaps: it shows what is around its gaps. floor_grid: squares of a metre on the floor.
     start_at_once: dropped photos are reconstructed without asking. detail: of DETAILS, how fine scenes of
-    photos are. panel_width: design pixels. window: x, y, width, height in screen pixels, or none.
-    dictionary: the same of the dictionary's window inside it, design pixels, and whether it is open.
-    recent: newest first. folder: where one was last opened or saved."""
+    photos are. rasteriser: of RASTERISERS. panel_width: design pixels. window: x, y, width, height in
+    screen pixels, or none. dictionary: the same of the dictionary's window inside it, design pixels, and
+    whether it is open. recent: newest first. folder: where one was last opened or saved."""
 
     theme: str = "dark"
     colormap: str = COLOUR_MAPS[0]
@@ -49,6 +51,7 @@ class Preferences:
     floor_grid: bool = False
     start_at_once: bool = True
     detail: str = DEFAULT_DETAIL
+    rasteriser: str = RASTERISERS[0]
     panel_width: float = 348.0
     window: tuple[int, ...] = ()
     maximised: bool = False
@@ -169,6 +172,8 @@ def _fitting(name: str, value: Any) -> Any:
         return value if value in THEMES else None
     if name == "colormap":
         return value if value in COLOUR_MAPS else None
+    if name == "rasteriser":
+        return value if value in RASTERISERS else None
     if name == "detail":
         return value if isinstance(value, str) and value in DETAILS else None
     if name == "folder":

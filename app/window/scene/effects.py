@@ -113,6 +113,7 @@ class SceneEffects(Effects):
                 self._go_on(command, before, state)
         self._look_for_work(before, state)
         self._show_whole(before, state)
+        self._draw_as_preferred(before, state)
 
     def after_picture(self, state: State) -> None:
         self._choose_around(state)
@@ -169,6 +170,11 @@ class SceneEffects(Effects):
                 pass
         for each in waited:
             self._hands.perform(each)
+
+    def _draw_as_preferred(self, before: State, state: State) -> None:
+        wanted = state.preferences.rasteriser
+        if wanted != before.preferences.rasteriser:
+            self._viewport.draw_with(wanted)
 
     def _show_whole(self, before: State, state: State) -> None:
         """Of many photos the one that the scene is compared with, whole."""

@@ -7,7 +7,8 @@ from app.gl.answers import ShaderAnswers
 from app.gl.hardware import hardware_of
 from app.gl.processor.host import HostAnswers
 from app.gl.splats import SplatBuffers
-from app.gl.tiled.splats import COMPUTE, TiledSplats
+from app.gl.tiled.splats import TiledSplats
+from langflash_core.base.graphics import COMPUTE
 from langflash_core.language.relevance import CompiledQuery
 from langflash_core.types import Scene
 

@@ -11,7 +11,8 @@ from app.gl import SplatRenderer
 from app.gl.painter import Painter
 from app.gl.splats import SplatBuffers
 from app.gl.tiled import lists
-from app.gl.tiled.splats import COMPUTE, TiledSplats
+from app.gl.tiled.splats import TiledSplats
+from langflash_core.base.graphics import COMPUTE
 from langflash_core.scene.changes import Recoloured
 from langflash_core.scene.mask import Mask
 from langflash_core.splat import render

@@ -11,6 +11,8 @@ import torch
 from app.gl.layered import LayeredLevel
 from app.gl.processor import still
 from app.gl.scene import Thinned
+from app.gl.tiled.splats import TiledSplats
+from app.gl.tiled.trial import Trial
 from app.window.asking.commands import Answered, Narrowed
 from app.window.asking.work import Answer
 from app.window.drawing.card import CardPicture
@@ -130,6 +132,32 @@ def test_what_moves_in_full_size_is_followed_by_the_exact_picture(viewport) -> N
     still = picture.stills.shown
     assert Plan(Kind.COLOUR) in plans[:-1], "the moving one came first"
     assert still is not None and (still.camera.width, still.camera.height) == SIZE
+
+
+def test_another_way_to_draw_is_taken_at_once(viewport, monkeypatch) -> None:
+    """As on a card whose trial said quads."""
+    for module in ("window.viewport", "gl.tiled.trial"):
+        monkeypatch.setattr(f"app.{module}.draws_in_software", lambda ctx: False)
+    monkeypatch.setattr("app.gl.tiled.trial.tried", lambda ctx: Trial(1.0, 2.0))
+    scene = spoken_room()
+    state = showing(scene).with_asking(prompts=())
+    viewport.set_scene(1, scene)
+    pictures: list[np.ndarray] = []
+    for wanted, way in (("measured", "quads"), ("tiles", "tiles"), ("quads", "quads")):
+        viewport.draw_with(wanted)
+        if wanted == "tiles" and viewport.stats(card="A card").renderer != "A card, tiles":
+            pytest.skip("OpenGL 4.3 is not here")
+        for _ in living(viewport, state):
+            if viewport.whole:
+                break
+        assert viewport.stats(card="A card").renderer == f"A card, {way}"
+        level = viewport.picture.easel.renderer.picture().level
+        assert all((type(part.splats) is TiledSplats) == (way == "tiles") for part in level.parts)
+        pictures.append(viewport.seen().astype(int))
+    quads, tiles, again = pictures
+    assert np.array_equal(quads, again) and quads.max() > 100
+    # A few layers of float16 lose 2^-10 each as quads, which is a step of the screen's at the most.
+    assert 0 < np.abs(tiles - quads).max() <= 3
 
 
 def test_pictures_that_move_and_that_rest_are_in_the_light_of_their_place(viewport) -> None:

@@ -23,7 +23,7 @@ def test_they_come_back_as_they_were_left(folders: Path) -> None:
     left = Preferences(
         theme="light", scale=1.5, speed=2.0, touch_pad=True, panel_width=420.0,
         window=(-30, 40, 1000, 700), maximised=True, dictionary=(400, 60, 372, 430),
-        dictionary_open=True, detail="high", recent=("/a b/ä.langflash",),
+        dictionary_open=True, detail="high", rasteriser="tiles", recent=("/a b/ä.langflash",),
     )  # fmt: skip
     preferences.save(left)
     assert preferences.load() == (left, "")
@@ -50,6 +50,7 @@ def test_a_damaged_file_gives_defaults_and_a_sentence(folders: Path, content: by
         ("window", [1, 2, 3]), ("window", [0, 0, 10, 10]), ("window", [1e9, 0, 900, 600]),
         ("dictionary", [0, 0, 300]), ("dictionary_open", 1), ("recent", [1]), ("recent", "room"),
         ("panel_width", None), ("detail", "highest"), ("detail", 2), ("detail", ["low"]),
+        ("rasteriser", "triangles"), ("rasteriser", ["tiles"]),
     ],
 )  # fmt: skip
 def test_one_bad_value_costs_only_itself(folders: Path, name: str, value: object) -> None:
@@ -88,7 +89,7 @@ def test_what_is_set_by_name_is_a_preference(monkeypatch: pytest.MonkeyPatch) ->
     issued: list[Command] = []
     with context((800, 600)):
         frames(lambda seen: issued.extend(panels.draw_settings(State(), seen)), look(), 1)
-    looks = {"theme", "colormap", "detail", "scale"}
+    looks = {"theme", "colormap", "detail", "rasteriser", "scale"}
     switches = {"photos_in_space", "near_photos", "fill_gaps", "floor_grid"}
     assert changed(issued[0], DEFAULTS) == looks | switches | {"touch_pad", "start_at_once"}
     state = shown_scene()
