@@ -1,7 +1,8 @@
 """The splat renderer: draws a scene once per camera and answers any phrase from what it drew.
 
-Passes, back to front, premultiplied: colour + depth + transmittance, then weight maps, 24 atoms
-a pass, only the atoms in view; of a layered scene so for each layer, and then blended (blend.py).
+Passes, back to front, premultiplied (tile by tile, front to back, by tiled/): colour + depth + transmittance,
+then weight maps, 24 atoms a pass, only the atoms in view; of a layered scene so for each layer, and then
+blended (blend.py).
 Queries, heat-maps and labels read those and touch no splat.
 Against the float64 reference (tests/app/gl/test_gl_against_reference.py): about 60 dB and a mean
 relevance error of 1e-4 with float16 targets, 100 dB and 1e-7 with float32.

@@ -19,6 +19,7 @@ HIDDEN = 255  # a tint: not to be drawn
 MOST_PAIRS = 1 << 24  # of Gaussians and tiles: 268 MB; a picture with more is drawn as quads
 GROUP = 256  # threads that work together
 _SCANNING = 1024  # those of the one group that sums up counts: as many as OpenGL 4.3 grants
+_MOST_GROUPS = 65_535  # a shader runs, as many as OpenGL 4.3 grants
 _EACH = 8  # elements a thread sorts
 _DIGIT = 4  # bits of a key, sorted at once: counters of a group fill 16 KB, half of what OpenGL 4.3 grants
 _HIGH_BITS = 28  # of a depth key's upper word: eleven of the exponent, less what no depth has, and mantissa
@@ -35,7 +36,10 @@ class TileLists:
     num_seen: Gaussians that touch a tile. num_pairs: of Gaussians and tiles. size: (width, height) pixels.
     """
 
-    def __init__(self, ctx: moderngl.Context, programs: Programs, vertices: Vertices, count: int):
+    def __init__(
+        self, ctx: moderngl.Context, programs: Programs, vertices: Vertices, count: int, beside: int
+    ):
+        """beside: bytes of each Gaussian in any buffer that shaders read beside the lists."""
         self.num_seen = self.num_pairs = 0
         self.size = (0, 0)
         self._ctx = ctx
@@ -45,6 +49,7 @@ class TileLists:
         self._made = {name: Growing(ctx) for name in ("splats", "ranges", "counts", "totals", "atoms")}
         self._elements = [Growing(ctx), Growing(ctx)]  # keys and rows, by turns
         self._pairs = [Growing(ctx), Growing(ctx)]
+        self._bytes = max(_SPLAT, vertices.most_bytes, beside)
         self._most_bytes = ctx.info["GL_MAX_SHADER_STORAGE_BLOCK_SIZE"]
 
     def find(self, camera: Camera, projection: tuple[Mapping, Mapping], exact: bool) -> bool:
@@ -56,7 +61,7 @@ class TileLists:
         """
         self.size = (camera.width, camera.height)
         self.num_seen = self.num_pairs = 0
-        if self._count * max(_SPLAT, self._vertices.most_bytes) > self._most_bytes:
+        if self._count > min(self._most_bytes // self._bytes, _MOST_GROUPS * GROUP):
             return False
         seen, low, high = self._project(camera, *projection)
         pairs = low + (high << 32)

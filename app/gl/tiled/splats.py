@@ -9,7 +9,7 @@ from langflash_core.base.graphics import Programs, set_uniforms
 from langflash_core.types import Camera, Scene
 
 from ..carried import bytes_of
-from ..layout import ATOMS_A_LAYER
+from ..layout import ATOMS_A_LAYER, LAYERS_A_PASS
 from ..ordering import FEW
 from ..shapes import MakeShapes, Quads
 from ..splats import Drawable, SplatBuffers
@@ -32,7 +32,8 @@ class TiledSplats(SplatBuffers):
         shapes: MakeShapes = Quads,
     ):
         super().__init__(ctx, programs, scene, shapes)
-        self._lists = TileLists(ctx, programs, self._vertices, self.num_gaussians)
+        beside = max(bytes_of(LAYERS_A_PASS), 8 * self.carried.bits.shape[1])
+        self._lists = TileLists(ctx, programs, self._vertices, self.num_gaussians, beside)
         self._exact = True  # what is drawn next, or was last
         self._tiled = True
 

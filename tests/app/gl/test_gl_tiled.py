@@ -89,13 +89,15 @@ def test_one_splat_over_all_tiles_and_small_ones_before_and_behind(show):
     agree(renderer.frame(True), render(scene_of(gaussians), seen), "float32")
 
 
-def test_more_pairs_than_there_is_room_for_are_drawn_as_quads(pair, monkeypatch):
+@pytest.mark.parametrize("full", [{"MOST_PAIRS": 100}, {"_MOST_GROUPS": 1}])
+def test_what_there_is_no_room_for_is_drawn_as_quads(pair, monkeypatch, full):
     scene, seen = cloud(300, dtype=torch.float32), camera()
     quads, tiles = pair(scene, asked=question(scene))
     for each in (quads, tiles):
         each.draw(seen)
     equal(quads, tiles)
-    monkeypatch.setattr(lists, "MOST_PAIRS", 100)
+    for name, value in full.items():
+        monkeypatch.setattr(lists, name, value)
     for each in (quads, tiles):
         each.forget()
         each.draw(seen)
@@ -107,6 +109,18 @@ def test_more_pairs_than_there_is_room_for_are_drawn_as_quads(pair, monkeypatch)
     tiles.draw(camera(pose=turned(0.1, (0.0, 0.0, 0.0))))
     tiles.draw(seen)
     assert not torch.equal(tiles.frame(True).rgb, frames[0].rgb), "tiles again, where there is room"
+
+
+@pytest.mark.parametrize("num_atoms", [0, 2000])
+def test_buffers_are_no_larger_than_the_driver_lets_shaders_see(gl, num_atoms):
+    """What a pass of weights takes, or the bits of many atoms; beyond that a shader reads zeros."""
+    scene = cloud(300, num_atoms, dtype=torch.float32)
+    a_gaussian = max(96, 8 * -(-num_atoms // 64))
+    for limit, fits in ((300 * a_gaussian, True), (300 * a_gaussian - 1, False)):
+        tiled = tiles_of(gl, scene)
+        tiled._lists._most_bytes = limit
+        assert tiled._lists.find(camera(), tiled._projection(camera()), exact=True) == fits
+        tiled.release()
 
 
 def test_pairs_are_counted_beyond_32_bits(gl):

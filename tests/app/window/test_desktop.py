@@ -66,6 +66,24 @@ def test_what_glfw_complains_of_is_not_written_to_the_terminal(monkeypatch, capf
     assert capfd.readouterr().err == ""
 
 
+@pytest.mark.parametrize(("there", "asked"), [((4, 3), [4]), ((3,), [4, 3])])
+def test_opengl_4_3_is_asked_for_first(monkeypatch, there: tuple[int, ...], asked: list[int]) -> None:
+    """Some drivers give no more than is asked for; macOS has 4.1."""
+    hints: dict[int, int] = {}
+    majors: list[int] = []
+
+    def create(*_: Any) -> object | None:
+        assert hints[glfw.CONTEXT_VERSION_MINOR] == 3
+        majors.append(hints[glfw.CONTEXT_VERSION_MAJOR])
+        return object() if majors[-1] in there else None
+
+    monkeypatch.setattr(glfw, "window_hint", hints.__setitem__)
+    monkeypatch.setattr(glfw, "create_window", create)
+    for name in ("init", "make_context_current", "swap_interval", "set_error_callback"):
+        monkeypatch.setattr(glfw, name, lambda *_: True)
+    assert open_window((900, 560)) and majors == asked
+
+
 @pytest.mark.parametrize(
     ("dots", "remembered", "expected"),
     [
