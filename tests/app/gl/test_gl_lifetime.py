@@ -20,13 +20,14 @@ from app.gl.layered import KEPT
 from app.gl.layout import DEFINES
 from app.gl.splats import SplatBuffers
 from app.gl.targets import gl_function
-from langflash_core.base.graphics import Programs
+from langflash_core.base.graphics import COMPUTE, Programs
 from langflash_core.errors import GraphicsError
 from langflash_core.types import Scene
 from tests.app.gl.questions import question
 from tests.app.gl.test_gl_layers import layered
 from tests.splat.scenes import camera, cloud, maps_of
 
+COMPUTING = "#version 430 core\nlayout(local_size_x = 1) in; void main() {}"
 KINDS = ("Texture", "Buffer", "Framebuffer", "Program", "VertexArray", "Shader")
 
 
@@ -67,14 +68,21 @@ def test_a_scene_takes_on_the_card_what_is_told(gl, degree):
 
 @pytest.fixture(scope="module")
 def use_another_program(context):
-    """A program in use outlives its deletion: use this one before counting."""
+    """A program in use outlives its deletion, and so does a compute shader: use these before counting."""
     context.__enter__()  # current, whoever else drew in between
     program = context.program(
         vertex_shader="#version 330 core\nout float x; void main() { x = 1.0; }", varyings=["x"]
     )
     room, draws = context.buffer(reserve=4), context.vertex_array(program, [])
-    yield lambda: draws.transform(room, vertices=1)
-    for owned in (draws, room, program):
+    shader = context.compute_shader(COMPUTING) if context.version_code >= COMPUTE else None
+
+    def use() -> None:
+        if shader is not None:
+            shader.run(1)
+        draws.transform(room, vertices=1)
+
+    yield use
+    for owned in (draws, room, program, *([shader] if shader is not None else [])):
         owned.release()
 
 
