@@ -40,7 +40,13 @@ def says(monkeypatch):
 
 @pytest.mark.parametrize(
     ("quads", "tiles", "way"),
-    [(10.0, 5.0, "tiles"), (10.0, 9.5, "quads"), (5.0, 10.0, "quads"), (10.0, math.inf, "quads")],
+    [
+        (10.0, 5.0, "tiles"),
+        (10.0, 9.5, "quads"),
+        (5.0, 10.0, "quads"),
+        (10.0, math.inf, "quads"),
+        (math.inf, math.inf, "quads"),
+    ],
 )
 def test_a_card_draws_the_way_that_is_clearly_quicker(says, quads, tiles, way):
     says(Trial(quads, tiles))
@@ -120,3 +126,10 @@ def test_tiles_that_are_refused_or_show_something_else_are_not_taken(gl, monkeyp
     assert measured(gl).tiles_ms == math.inf
     monkeypatch.setattr(trial, "TiledSplats", SplatBuffers)
     assert measured(gl).tiles_ms < math.inf
+
+
+@pytest.mark.usefixtures("small")
+def test_a_driver_that_refuses_the_trial_stops_no_window(gl, monkeypatch):
+    for name in ("SplatBuffers", "TiledSplats"):
+        monkeypatch.setattr(trial, name, Refused)
+    assert measured(gl).sooner == "quads"
