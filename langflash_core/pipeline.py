@@ -22,6 +22,7 @@ from langflash_core.language.answers import answer
 from langflash_core.language.minilm import load_minilm, shipped_files
 from langflash_core.language.narrowing import narrow_view
 from langflash_core.language.relevance import Mode, finite_dictionary, relevance_maps
+from langflash_core.language.settings import ANSWERING
 from langflash_core.language.spaces import encode_cached, language_space
 from langflash_core.language.spoken import compile_spoken
 from langflash_core.language.vocabulary import all_phrases
@@ -324,6 +325,7 @@ def _page_phrases(
         gram=atoms @ atoms.T,
         temperature=compiled.temperature,
         threshold=limit,
+        half=ANSWERING.half if threshold is None else 0.0,
         dictionary=met if with_text else None,
         rivals=encode_cached(space, space.rivals) if with_text else None,
         lead=leads.offset,

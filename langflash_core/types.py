@@ -444,7 +444,8 @@ class PromptAnswer:
     the mask. centroid, box (center, axes (3, 3) rows, size): scene units, None when not found. note: for
     people, where the phrase may not mean what was written; "" for most. reading: how the phrase was
     understood, head first ("chair, white"); "" where it was asked as it stands. mask: (H, W) bool, its pixels
-    in that view, none where it is not found; None where nobody keeps it.
+    in that view, none where it is not found; None where nobody keeps it. lit_from: the value from which a
+    pixel belongs to it.
     """
 
     prompt: str
@@ -457,6 +458,7 @@ class PromptAnswer:
     note: str = ""
     reading: str = ""
     mask: Bool[Tensor, "H W"] | None = field(default=None, repr=False, compare=False)
+    lit_from: float = 0.0
 
 
 @dataclass(frozen=True)

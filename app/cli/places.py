@@ -146,7 +146,7 @@ def write_thumbnail(scene: Scene, result: QueryResult | None, path: Path) -> Non
             pictures.append(photo.convert("RGB"))
     for answer, relevance in zip(result.answers[:_HEATS], result.relevance, strict=False) if result else ():
         assert result is not None
-        lit = heat_over(relevance, result.frame.rgb, answer.threshold, result.mode)
+        lit = heat_over(relevance, result.frame.rgb, answer.lit_from, result.mode)
         pictures.append(Image.fromarray(to_8bit(lit)))
     small = [p.resize((max(1, round(_HEIGHT * p.width / p.height)), _HEIGHT)) for p in pictures]
     stream = io.BytesIO()

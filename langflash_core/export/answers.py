@@ -47,9 +47,9 @@ def write_answers(
     files = []
     for index, name in enumerate(file_names([answer.prompt for answer in result.answers])):
         own = {kind: folder / f"{name}_{kind}.png" for kind in ("mask", "heat", "relevance")}
-        relevance, threshold = result.relevance[index], result.answers[index].threshold
+        relevance, lit_from = result.relevance[index], result.answers[index].lit_from
         write_mask(own["mask"], result.masks[index])
-        write_heat(own["heat"], relevance, result.frame.rgb, threshold, result.mode, colours)
+        write_heat(own["heat"], relevance, result.frame.rgb, lit_from, result.mode, colours)
         write_relevance(own["relevance"], relevance, result.mode)
         files.append({kind: str(path) for kind, path in {**own, **shared}.items()})
     return files

@@ -72,7 +72,8 @@ class Phrases:
 
     texts: P phrases, the first `num_asked` of them shown at once. scores (P, K): d_k . t.
     negatives (M, K): d_k . n of what a phrase is compared with. gram (K, K): d_j . d_k.
-    temperature, threshold: as of a query in mode relevancy. dictionary (K, C): d_k + |d_k| a, and rivals (V,
+    temperature, threshold: as of a query in mode relevancy. half: of a score's log odds, from which pixels
+    show the phrase; 0: from the threshold on. dictionary (K, C): d_k + |d_k| a, and rivals (V,
     C): names that others are measured against, where phrases t are to be answered that are not among the
     texts; they start with lead + a . t.
     """
@@ -87,6 +88,7 @@ class Phrases:
     dictionary: Tensor | None = None
     rivals: Tensor | None = None
     lead: float = 0.0
+    half: float = 0.0
 
 
 @dataclass(frozen=True)
@@ -230,7 +232,7 @@ def _encode(scene: Scene, phrases: Phrases | None) -> tuple[dict, bytes]:
         header["phrases"] = {
             "texts": list(phrases.texts), "asked": phrases.num_asked, "atoms": len(phrases.gram),
             "temperature": phrases.temperature, "threshold": phrases.threshold,
-            "lead": phrases.lead,
+            "lead": phrases.lead, "half": phrases.half,
         }  # fmt: skip
         columns += weight_columns(held)
         tables = {

@@ -143,8 +143,8 @@ def write_frame(frame: Frame, path: Path) -> None:
 def write_answer(result: QueryResult, path: Path) -> None:
     """One picture of an answer: heat for one prompt, the view under label colours for more."""
     if len(result.answers) == 1:
-        threshold = result.answers[0].threshold
-        write_heat(path, result.relevance[0], result.frame.rgb, threshold, result.mode)
+        lit_from = result.answers[0].lit_from
+        write_heat(path, result.relevance[0], result.frame.rgb, lit_from, result.mode)
         return
     write_rgb(path, torch.from_numpy(label_picture(result)))
 

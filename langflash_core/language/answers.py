@@ -27,8 +27,9 @@ def answer(
     """Answer P prompts in one view.
 
     score = mean of the highest 0.1 % of the covered pixels (alpha >= 0.5), at least one;
-    mask = relevance >= threshold at covered pixels; found = score >= threshold and the mask
-    covers at least 0.05 % of the image. The mask of a phrase that is not found is empty.
+    mask = relevance >= the threshold if one is given, else half of the score's log odds, at covered
+    pixels; found = score >= threshold and the mask covers at least 0.05 % of the image. The mask of a
+    phrase that is not found is empty.
 
     Args:
         relevance: (P, H, W) of `relevance_maps`.
@@ -45,13 +46,17 @@ def answer(
     # Without atoms nothing can be there, whatever the threshold.
     covered = (frame.alphas >= ANSWERING.covered_alpha) & (compiled.factor.shape[0] > 0)  # (H, W)
     scores = presence_scores(relevance, covered)
-    masks = (relevance >= limit) & covered
+    chosen = threshold is not None or compiled.mode == "cosine"
+    lit = [limit if chosen else ANSWERING.lit_from(score, limit) for score in scores.tolist()]
+    masks = (relevance >= relevance.new_tensor(lit)[:, None, None]) & covered
     found = (scores >= limit) & (masks.flatten(1).float().mean(1) >= ANSWERING.min_area)
     masks = masks & found[:, None, None]
     points = world_points(frame.depths, camera)  # (H, W, 3)
     answers = tuple(
-        _one(text, float(score), limit, mask, points[mask], values[mask])
-        for text, score, mask, values in zip(compiled.texts, scores, masks, relevance, strict=True)
+        replace(_one(text, float(score), limit, mask, points[mask], values[mask]), lit_from=least)
+        for text, score, mask, values, least in zip(
+            compiled.texts, scores, masks, relevance, lit, strict=True
+        )
     )
     if compiled.notes:
         answers = tuple(replace(one, note=note) for one, note in zip(answers, compiled.notes, strict=True))

@@ -93,7 +93,7 @@ def check_answer(page: Browser, ours: QueryResult, view: int) -> None:
     assert theirs.score == pytest.approx(answer.score, abs=0.01)
     if answer.found:
         assert theirs.relevance is not None
-        mask = (theirs.relevance >= answer.threshold) & (theirs.alpha >= ANSWERING.covered_alpha)
+        mask = (theirs.relevance >= answer.lit_from) & (theirs.alpha >= ANSWERING.covered_alpha)
         expected = ours.masks[0].numpy()
         assert (mask & expected).sum() / (mask | expected).sum() >= LEAST_IOU
 
@@ -146,7 +146,7 @@ def test_the_canvas_shows_the_photos_view(page, file, scene):
     page.show(file, scene.view_size, "#bare&mode=photo")
     assert decibels(shown(page), ours.frame.rgb.numpy()) >= LEAST_DB
     page.show(file, scene.view_size, "#bare&ask=armchair")
-    heat = heat_over(ours.relevance[0], ours.frame.rgb, ours.answers[0].threshold, "relevancy")
+    heat = heat_over(ours.relevance[0], ours.frame.rgb, ours.answers[0].lit_from, "relevancy")
     assert decibels(shown(page), heat.numpy()) >= LEAST_DB
 
 

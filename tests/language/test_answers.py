@@ -95,6 +95,22 @@ def test_a_scene_without_atoms_has_nothing_whatever_the_threshold():
         assert not result.answers[0].found
 
 
+def test_a_mask_needs_half_of_what_its_best_pixels_have():
+    """Half of the log odds of 0.98 are those of 0.875, of 0.8 those of 2 / 3; a given threshold holds."""
+    relevance = torch.stack([blob(slice(10, 30), slice(50, 70), best) for best in (0.98, 0.8, 0.45)])
+    relevance[:, 40:50, 10:20] = 0.86
+    relevance[1:, 40:50, 10:20] = 0.7
+    relevance[2, 40:50, 10:20] = 0.42
+    asked = query("door", "lamp", "rug", threshold=0.4)
+    result = answer(relevance, frame(), camera(), asked)
+    assert [int(mask.sum()) for mask in result.masks] == [400, 500, 500]
+    assert [one.lit_from for one in result.answers] == pytest.approx([0.875, 2 / 3, 0.4], abs=1e-6)
+    assert [one.threshold for one in result.answers] == [0.4] * 3
+    chosen = answer(relevance, frame(), camera(), asked, 0.4)
+    assert [int(mask.sum()) for mask in chosen.masks] == [500, 500, 500]
+    assert [one.lit_from for one in chosen.answers] == [0.4] * 3
+
+
 def test_threshold_decides_and_is_checked():
     relevance = blob(slice(10, 30), slice(50, 70), inside=0.6)[None]
     assert answer(relevance, frame(), camera(), query("lamp"), 0.55).answers[0].found

@@ -81,7 +81,13 @@ class Prompt:
     @property
     def shown_from(self) -> float:
         """Relevance from which its heat-map shows something: of a near miss, what comes nearest."""
-        return self.lowest if self.maybe else self.cut
+        return self.lowest if self.maybe else self.lit_from
+
+    @property
+    def lit_from(self) -> float:
+        """Relevance from which a pixel belongs to it: the person's own threshold, else by its score."""
+        chosen = self.threshold is not None or self.score is None
+        return self.cut if chosen else ANSWERING.lit_from(self.score, self.cut)
 
 
 def free_colour(prompts: Sequence[Prompt]) -> tuple[float, float, float]:

@@ -160,7 +160,7 @@ class Easel:
         active = next((i for i, p in enumerate(asked) if p.key == state.asking.active), 0)
         fill, faded = fills_gaps(state), mode is pictures.RGB and keeps_near(state, self.drawn.pose)
         shown_from = asked[active].shown_from if asked else 0.0
-        colours, cuts = tuple(p.colour for p in asked), tuple(p.cut for p in asked)
+        colours, cuts = tuple(p.colour for p in asked), tuple(p.lit_from for p in asked)
         wanted = Wanted(colours, cuts, active, shown_from, state.asking.atom, state.heat_colours)
         painted = (mode, faded, fill, wanted)
         if painted == self._painted:

@@ -6,6 +6,7 @@ const COVERED_ALPHA = 0.5; // from here on a pixel shows the scene
 const TOP_FRACTION = 0.001; // of the covered pixels: their mean is the score
 const MIN_AREA = 0.0005; // of all pixels: a smaller mask is noise
 const BINS = 4096;
+const SUREST = 0.9999; // no score counts for more
 const KIN = 0.6; // cosine of names that mean the same
 const BEHIND = 0.8; // of how much a phrase is behind the best other name, what it loses
 
@@ -108,12 +109,19 @@ class Answers {
   }
 }
 
-// {score, found, area} of relevance and alpha, one number a pixel each.
-function judged(relevance, alpha, threshold) {
+// {score, found, area, lit} of relevance and alpha, one number a pixel each; lit: from which a pixel shows it.
+function judged(relevance, alpha, { threshold, half }) {
   const covered = relevance.filter((_, pixel) => alpha[pixel] >= COVERED_ALPHA);
-  const area = covered.reduce((sum, value) => sum + (value >= threshold), 0) / relevance.length;
   const score = meanOfHighest(covered, Math.ceil(TOP_FRACTION * covered.length));
-  return { score, area, found: score >= threshold && area >= MIN_AREA };
+  const lit = litFrom(score, threshold, half);
+  const area = covered.reduce((sum, value) => sum + (value >= lit), 0) / relevance.length;
+  return { score, area, lit, found: score >= threshold && area >= MIN_AREA };
+}
+
+// The relevancy from which pixels belong to the mask of a phrase that scores so.
+function litFrom(score, threshold, half) {
+  if (!half || score <= 0.5 || score < threshold) return threshold;
+  return 1 / (1 + (1 / Math.min(score, SUREST) - 1) ** half);
 }
 
 // Mean of the `most` highest of values in [0, 1]; 0 of none. Sorts the few bins that matter.

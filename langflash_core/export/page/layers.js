@@ -96,8 +96,8 @@ class LayeredAnswers {
   // answers: of each layer.
   constructor(answers) {
     this.answers = answers;
-    const { texts, asked, threshold, temperature } = answers[0];
-    Object.assign(this, { texts, asked, threshold, temperature });
+    const { texts, asked, threshold, half, temperature } = answers[0];
+    Object.assign(this, { texts, asked, threshold, half, temperature });
   }
 
   learn(text, vector) {

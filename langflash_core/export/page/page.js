@@ -258,6 +258,7 @@ class Page {
     if (this.carried) this.drawing.drop(this.carried);
     const row = this.asking.chosen;
     this.carried = row === null || !this.answers ? null : this.drawing.upload(this.answers.numbers([row]));
+    this.lit = this.answers?.threshold;
     if (row !== null && !this.heat) this.setHeat(true);
     clearTimeout(this.others);
     this.listRooms();
@@ -285,6 +286,13 @@ class Page {
     if (this.target) this.drawing.release(this.target);
     this.target = this.drawing.target([this.canvas.width, this.canvas.height], 1);
     this.moved();
+  }
+
+  // Shows the chosen phrase from where its score says on.
+  light(answer) {
+    if (!answer || answer.lit === this.lit) return;
+    this.lit = answer.lit;
+    this.draw(1, true);
   }
 
   // The lens of the canvas, with `scale` times as many pixels a side.
@@ -322,7 +330,7 @@ class Page {
     const glows = this.heat && this.carried !== null;
     this.sharp = scale === 1;
     this.drawing.splat(this.target, this.orbit, this.shown(scale), glows ? this.carried : null);
-    this.drawing.show(this.target, glows ? this.answers : null);
+    this.drawing.show(this.target, glows ? { ...this.answers, threshold: this.lit } : null);
     this.notes.place(this.orbit, this.shown(1), this.ratio, all);
     this.plan.here(this.orbit);
   }
@@ -339,6 +347,7 @@ class Page {
     this.embedding.camera();
     if (!this.asking || !this.answers) return;
     const answers = this.judge(this.asking.asked, this.shown(this.judgedScale()));
+    this.light(answers.get(this.asking.chosen));
     this.asking.answer(answers);
     const told = [...answers].map(([row, { found, score }]) => ({
       phrase: this.answers.texts[row],

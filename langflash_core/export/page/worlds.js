@@ -105,7 +105,7 @@ class World {
         const relevance = alpha.map((_, pixel) => {
           return this.answers.relevance(read[1][4 * pixel], read[layer][4 * pixel + channel]);
         });
-        answers.set(row, { ...judged(relevance, alpha, this.answers.threshold), relevance });
+        answers.set(row, { ...judged(relevance, alpha, this.answers), relevance });
       });
       this.drawing.drop(numbers);
       this.drawing.release(target);

@@ -50,6 +50,7 @@ from langflash_core.lab.training.measures import (
     mean_iou,
     nan_mean,
 )
+from langflash_core.language.answers import presence_scores
 from langflash_core.language.relevance import compile_query, relevance_maps
 from langflash_core.language.settings import ANSWERING
 from langflash_core.language.spaces import LanguageSpace, language_space
@@ -385,7 +386,10 @@ def overlap_fine(judged: Judged, drawn: Drawn, tally: Tally) -> None:
     rows = judged.words.fine_of[drawn.ids][labelled]
     places = judged.words.rows(judged.words.fine)
     for row in sorted(set(rows[rows >= 0].tolist())):
-        found, truth = drawn.maps[places[row]][labelled] >= drawn.threshold, rows == row
+        values, truth = drawn.maps[places[row]], rows == row
+        score = float(presence_scores(values[None], torch.ones_like(labelled)))
+        lit_from = ANSWERING.lit_from(score, drawn.threshold)
+        found = (values >= lit_from)[labelled] & (score >= drawn.threshold)
         name = judged.words.fine[row]
         both, either, photos = tally.overlaps.get(name, (0, 0, 0))
         tally.overlaps[name] = (

@@ -79,7 +79,7 @@ def _answers(scene: Scene, renderer: Renderer, prompts: Sequence[str]) -> list[n
     result = pipeline.query(scene, prompts, camera=camera, render=renderer)
     cells = []
     for answer, relevance in zip(result.answers, result.relevance, strict=True):
-        view = heat_over(relevance, result.frame.rgb, answer.threshold, result.mode)
+        view = heat_over(relevance, result.frame.rgb, answer.lit_from, result.mode)
         verdict = f"{answer.score:.2f}" if answer.found else f"not found ({answer.score:.2f})"
         cells.append(add_caption(to_8bit(view), f"{answer.prompt}: {verdict}"))
     return cells

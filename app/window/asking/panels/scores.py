@@ -52,7 +52,7 @@ def _known(scene: "Scene") -> Reliability | None:
 
 def _span(state: State, prompt: Prompt, look: Look) -> list[do.Command]:
     """From where to where the colours of the heat-map reach."""
-    low, high = state.heat_colours.ends(prompt.cut)
+    low, high = state.heat_colours.ends(prompt.lit_from)
     imgui.align_text_to_frame_padding()
     imgui.text_colored(theme.MUTED, "Colours from")
     imgui.same_line()

@@ -58,7 +58,7 @@ class _Told(Facts):
     def heat(self) -> tuple[str, float, float]:
         prompt = self.state.asking.active_prompt
         assert prompt is not None
-        return prompt.text, *self.state.heat_colours.ends(prompt.cut)
+        return prompt.text, *self.state.heat_colours.ends(prompt.lit_from)
 
     @property
     def depth_range(self) -> tuple[float, float]:

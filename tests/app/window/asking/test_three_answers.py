@@ -46,7 +46,14 @@ from tests.app.window.scenes import PHRASES, after, room, shown_scene
 def test_a_near_miss_is_neither_found_nor_not(score: float, found: bool, maybe: bool) -> None:
     prompt = Prompt(0, "curtain", score=score, calibrated=0.85)
     assert (prompt.found, prompt.maybe) == (found, maybe)
-    assert prompt.shown_from < prompt.cut if maybe else prompt.shown_from == prompt.cut
+    assert prompt.shown_from < prompt.cut if maybe else prompt.shown_from == prompt.lit_from
+
+
+def test_a_phrase_glows_from_half_of_its_score_unless_a_person_chose_the_threshold() -> None:
+    asked = Prompt(0, "door", score=0.98, calibrated=0.79)
+    assert asked.lit_from == pytest.approx(0.875, abs=1e-6)
+    assert replace(asked, threshold=0.6).lit_from == 0.6
+    assert replace(asked, score=0.7).lit_from == replace(asked, score=None).lit_from == 0.79
 
 
 def test_what_fits_no_better_than_anything_is_never_maybe() -> None:
