@@ -86,8 +86,9 @@ class Prompt:
     @property
     def lit_from(self) -> float:
         """Relevance from which a pixel belongs to it: the person's own threshold, else by its score."""
-        chosen = self.threshold is not None or self.score is None
-        return self.cut if chosen else ANSWERING.lit_from(self.score, self.cut)
+        if self.threshold is not None or self.score is None:
+            return self.cut
+        return ANSWERING.lit_from(self.score, self.cut)
 
 
 def free_colour(prompts: Sequence[Prompt]) -> tuple[float, float, float]:
