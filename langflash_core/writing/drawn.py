@@ -64,8 +64,8 @@ def weight(look: Look) -> Painted:
 def relevance(look: Look) -> Painted:
     """One phrase's heat-map over the colours."""
     result = look.answer()
-    threshold = result.answers[0].threshold
-    lit = heat_over(result.relevance[0], result.frame.rgb, threshold, result.mode, look.colours)
+    lit_from = result.answers[0].lit_from
+    lit = heat_over(result.relevance[0], result.frame.rgb, lit_from, result.mode, look.colours)
     return to_8bit(lit), {"prompts": _answer_records(result)}
 
 

@@ -88,7 +88,7 @@ def ask_scene(
     for place, own in enumerate(file_names([f"{name} {prompt}" for prompt in prompts])):
         view, result = best[place]
         answer, picture = kept_of(result)[place], f"{PICTURES}/{own}.jpg"
-        shown = heat_over(result.relevance[place], result.frame.rgb, answer.threshold, result.mode, colours)
+        shown = heat_over(result.relevance[place], result.frame.rgb, answer.lit_from, result.mode, colours)
         write_atomically(folder / picture, encoded(to_8bit(shown), "JPEG", quality=88))
         photos = scene.record.photos
         photo = photos[view] if view < len(photos) else ""

@@ -44,8 +44,8 @@ def _write_answered(job: Job, path: Path, result: QueryResult) -> None:
     elif job.kind is MASK:
         write_mask(path, result.masks.any(0))
     else:
-        threshold = result.answers[0].threshold
-        lit = heat_over(result.relevance[0], result.frame.rgb, threshold, result.mode, job.colours)
+        lit_from = result.answers[0].lit_from
+        lit = heat_over(result.relevance[0], result.frame.rgb, lit_from, result.mode, job.colours)
         write_picture(path, to_8bit(lit))
 
 
