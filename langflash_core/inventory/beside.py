@@ -24,8 +24,9 @@ from langflash_core.geometry.harmonics import SH_C0
 from langflash_core.geometry.surfels import covered_areas
 from langflash_core.inventory.alignment import Fit, Render, align_scenes
 from langflash_core.inventory.gone import Fate, changes, fate
+from langflash_core.inventory.pieces import OPENINGS
 from langflash_core.inventory.settings import BESIDE, GONE
-from langflash_core.inventory.things import OPENINGS, Inventory, Thing, unlisted_thing, unsure
+from langflash_core.inventory.things import Inventory, Thing, unlisted_thing, unsure
 
 
 @dataclass(frozen=True)

@@ -34,6 +34,8 @@ from langflash_core.types import Scene
 
 STRUCTURE = ("wall", "floor", "ceiling")
 """Kinds that rooms are made of: no things."""
+OPENINGS = ("door", "window")
+"""Kinds that are in walls."""
 
 
 @dataclass(frozen=True)
@@ -78,6 +80,15 @@ def parts_of_room(scene: Scene, shares: Float[np.ndarray, " N"]) -> Parts:
         tuple(best.max(1).tolist()) if len(kept) else (),
         compiled.threshold,
     )
+
+
+def kinds_of(scene: Scene, threshold: float | None = None) -> np.ndarray:
+    """(N,) words of the vocabulary, "" of what answers none: the kind of each Gaussian by itself."""
+    names = list(OWN)
+    compiled = compile_query(scene, language_space(scene.semantics.space), names)
+    best, which = gaussian_relevance(scene.semantics, compiled).max(0)
+    limit = compiled.threshold if threshold is None else threshold
+    return np.where((best >= limit).numpy(), np.array(names)[which.numpy()], "")
 
 
 def _pieces(

@@ -1,13 +1,11 @@
 """A room from above: walls, what opens in them, and where things stand.
 
-Walls are planes: what answers "wall", "door" or "window" and is upright lies, seen from above, on a few lines
-along two directions across each other. Their common turn is the mean of the normals' azimuths, modulo a
-quarter; along it and across it a histogram of offsets has a peak a wall. A piece weighs its area over its
-distance from the nearest photo, since depth errs with that. A wall reaches as far as its points do, over gaps
-of `FLOOR_PLAN.gap`, and to the wall it meets. What is short, or small and not seen down to the floor, may be
-no wall, and is none where a thing stands across it.
+Walls are planes: what they are made of (`langflash_core/inventory/upright.py`) lies, seen from above, on a
+few lines along two directions across each other; along them a histogram of offsets has a peak a wall. A wall
+reaches as far as its points do, over gaps of `FLOOR_PLAN.gap`, and to the wall it meets. What is short, or
+small and not seen down to the floor, may be no wall, and is none where a thing stands across it.
 
-Lengths are in the inventory's unit; places are (east, north). Sizes: n points.
+Lengths are in the inventory's unit; places are (east, north).
 """
 
 import math
@@ -16,15 +14,12 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float
 from scipy.ndimage import gaussian_filter1d
-from scipy.spatial import KDTree
 
 from langflash_core.base.records import Guess
-from langflash_core.geometry.rotations import turn_of
-from langflash_core.geometry.surfels import covered_areas, normals_of
+from langflash_core.inventory.pieces import OPENINGS
 from langflash_core.inventory.settings import FLOOR_PLAN
-from langflash_core.inventory.things import OPENINGS, Inventory, Thing, kinds_of
-
-_OF_WALLS = ("wall", *OPENINGS)
+from langflash_core.inventory.things import Inventory, Thing
+from langflash_core.inventory.upright import Upright, upright_of
 
 Place = tuple[float, float]  # east, north
 
@@ -83,8 +78,8 @@ def floor_plan(found: Inventory) -> Plan:
     if found.unit != "m":  # by the median of its extents on the floor: rooms are 4 m across
         low, high = np.nanquantile(found.stands[:, [0, 2]], (0.02, 0.98), axis=0)
         metre = float(max(np.median(high - low), 1e-6)) / 4
-    pieces = _upright_pieces(found, metre)
-    turn = _common_turn(pieces)
+    pieces = upright_of(found.scene, found.world, found.stands, found.eyes, metre)
+    turn = pieces.turn
     matrix = np.array([[math.cos(turn), math.sin(turn)], [-math.sin(turn), math.cos(turn)]])
     walls = _extend_to_corners(_walls(pieces.along(matrix), metre), metre)
     walls = [_back(wall, matrix) for wall in walls]
@@ -94,7 +89,7 @@ def floor_plan(found: Inventory) -> Plan:
     openings = [Opening(thing, *place) for thing, place in placed if place is not None]
     astray = {thing.id for thing in others if any(goes_through(thing, wall, metre) for wall in walls)}
     parts = tuple(walls), tuple(openings), tuple(others), frozenset(astray)
-    return Plan(*parts, _eyes(found), math.degrees(turn), found.unit, found.guess)
+    return Plan(*parts, found.eyes, math.degrees(turn), found.unit, found.guess)
 
 
 def goes_through(thing: Thing, wall: PlanWall, metre: float) -> bool:
@@ -106,43 +101,7 @@ def goes_through(thing: Thing, wall: PlanWall, metre: float) -> bool:
     return bool(aside.min() < -deep and aside.max() > deep and 0 < middle < wall.length)
 
 
-@dataclass(frozen=True)
-class _Pieces:
-    """n pieces of what walls are made of: places and unit normals (n, 2) on the floor; heights, weights."""
-
-    places: Float[np.ndarray, "n 2"]
-    normals: Float[np.ndarray, "n 2"]
-    heights: Float[np.ndarray, " n"]
-    weights: Float[np.ndarray, " n"]
-
-    def along(self, matrix: Float[np.ndarray, "2 2"]) -> "_Pieces":
-        """Seen along other axes of the floor."""
-        return _Pieces(self.places @ matrix.T, self.normals @ matrix.T, self.heights, self.weights)
-
-
-def _upright_pieces(found: Inventory, metre: float) -> _Pieces:
-    scene = found.scene
-    normals = normals_of(scene.gaussians) @ turn_of(found.world).T
-    flat = normals[:, [0, 2]]
-    length = np.linalg.norm(flat, axis=1)
-    kinds, areas = kinds_of(scene), covered_areas(scene.gaussians)
-    upright = (np.abs(normals[:, 1]) < FLOOR_PLAN.upright) & (length > 0.5)
-    chosen = np.isin(kinds, _OF_WALLS) & upright & (areas > 0) & np.isfinite(found.stands).all(1)
-    stands = found.stands[chosen]
-    places, weights = stands[:, [0, 2]], areas[chosen]
-    if eyes := _eyes(found):
-        weights = weights / np.maximum(KDTree(eyes).query(places)[0], FLOOR_PLAN.nearest * metre)
-    return _Pieces(places, flat[chosen] / length[chosen, None], -stands[:, 1], weights)
-
-
-def _common_turn(pieces: _Pieces) -> float:
-    """Radians in [-pi/4, pi/4): the azimuth that most walls share, modulo a quarter; 0 of nothing."""
-    azimuths = 4 * np.arctan2(pieces.normals[:, 1], pieces.normals[:, 0])
-    mean = complex(pieces.weights @ np.exp(1j * azimuths)) if len(azimuths) else 0j
-    return 0.0 if abs(mean) < 1e-12 else math.atan2(mean.imag, mean.real) / 4
-
-
-def _walls(pieces: _Pieces, metre: float) -> list[PlanWall]:
+def _walls(pieces: Upright, metre: float) -> list[PlanWall]:
     """Walls along both axes, the largest first."""
     walls: list[PlanWall] = []
     total = float(pieces.weights.sum())
@@ -260,13 +219,6 @@ def _in_wall(thing: Thing, walls: list[PlanWall], metre: float) -> tuple[Place, 
             low, high = (tuple(point.tolist()) for point in ends)
             best = (across, low, high)
     return None if best is None else best[1:]
-
-
-def _eyes(found: Inventory) -> tuple[Place, ...]:
-    if not found.scene.photos:
-        return ()
-    eyes = found.scene.viewmats.double().inverse()[:, :3, 3].numpy()
-    return tuple((float(east), float(north)) for east, _, north in found.stand(eyes))
 
 
 def weighted_quantile(

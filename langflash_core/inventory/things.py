@@ -11,7 +11,7 @@ Lengths are metres where the scene's scale is known or guessed, else scene units
 
 import itertools
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
@@ -26,9 +26,10 @@ from langflash_core.errors import InputError
 from langflash_core.export import open_scene
 from langflash_core.geometry.rotations import turn_of
 from langflash_core.geometry.surfels import covered_areas
-from langflash_core.inventory.apart import DEEPEST, taken_apart
-from langflash_core.inventory.pieces import STRUCTURE, Parts, parts_of_room
+from langflash_core.inventory.apart import SEAT, SEATS, SURELY, largest, put_together, taken_apart
+from langflash_core.inventory.pieces import OPENINGS, STRUCTURE, Parts, parts_of_room
 from langflash_core.inventory.settings import LISTING
+from langflash_core.inventory.upright import upright_of
 from langflash_core.language.gaussians import gaussian_relevance
 from langflash_core.language.relevance import compile_query
 from langflash_core.language.settings import ANSWERING
@@ -40,7 +41,6 @@ from langflash_core.segments import evenly, photo_shares
 from langflash_core.surface.fused import fused_rows, told_in_layers
 from langflash_core.types import Scene, Segments
 
-OPENINGS = ("door", "window")
 FLAT = frozenset({
     *OPENINGS, "picture", "mirror", "clock", "calendar", "whiteboard", "dartboard", "tv", "tablet",
     "keyboard", "curtain", "rug", "mat", "towel", "towel rack", "blanket", "clothes", "hanging clothes",
@@ -49,6 +49,8 @@ FLAT = frozenset({
 })  # fmt: skip
 """Kinds that may be as thin as they look."""
 Box = tuple[tuple[float, float, float], tuple[float, float, float], float, float]
+Namer = Callable[[Integer[np.ndarray, " k"]], tuple[str, float]]
+"""Of some of a scene's rows, by their places: their kind, and their cosine with it."""
 _TURNS = np.radians(np.arange(0.0, 90.0, 3.0))
 
 
@@ -98,7 +100,7 @@ class Inventory:
     """The things of a room. scene: one surface of `given`, the scene that was asked for (`fused`).
     surface (M,): which Gaussians of that these are; None: all. scale: units of `unit` per scene unit. guess:
     where the scale is one. shares: of the photos that each Gaussian makes up. parts: of the room; those that
-    answer well are its things."""
+    answer well are its things. turn: of its walls, degrees from east to north in [-45, 45)."""
 
     scene: Scene = field(repr=False)
     given: Scene = field(repr=False)
@@ -109,6 +111,7 @@ class Inventory:
     guess: Guess | None
     shares: Float[np.ndarray, "V N"] = field(repr=False)
     parts: Parts = field(repr=False)
+    turn: float = 0.0
     things: tuple[Thing, ...] = ()
 
     def __repr__(self) -> str:
@@ -134,6 +137,14 @@ class Inventory:
     def stand(self, places: Float[np.ndarray, "n 3"]) -> Float[np.ndarray, "n 3"]:
         """Where places of the scene are in the world, in `unit`."""
         return self.scale * (places - np.array(self.world.origin)) @ turn_of(self.world).T
+
+    @cached_property
+    def eyes(self) -> tuple[tuple[float, float], ...]:
+        """East and north of where the photos were taken."""
+        if not self.scene.photos:
+            return ()
+        eyes = self.scene.viewmats.double().inverse()[:, :3, 3].numpy()
+        return tuple((float(east), float(north)) for east, _, north in self.stand(eyes))
 
     @property
     def metre(self) -> float:
@@ -200,7 +211,9 @@ def inventory(
     shares = photo_shares(scene).numpy()
     parts = parts_of_room(scene, shares.sum(0, dtype=float))
     whole = Inventory(scene, given, surface, world, unit, scale, guess, shares, parts)
-    whole = replace(whole, parts=_no_deeper(whole, least))
+    turn = upright_of(scene, world, whole.stands, whole.eyes, whole.metre).turn
+    whole = replace(whole, turn=math.degrees(turn))
+    whole = replace(whole, parts=_no_larger(whole, least))
     return replace(whole, things=_things(whole, threshold, least))
 
 
@@ -220,21 +233,12 @@ def unlisted_thing(whole: Inventory, rows: Integer[np.ndarray, " n"], others: Se
     areas, seen = covered_areas(scene.gaussians), whole.shares[:, rows].sum(1)
     space, some = language_space(scene.semantics.space), scene.semantics.rows(torch.from_numpy(rows))
     weights = torch.from_numpy(areas[rows] + 1e-12)
-    kind, _ = _best_name(scene, rows, weights.numpy(), names)
+    kind, _ = _namer(scene, rows, weights.numpy(), names)(np.arange(len(rows)))
     relevance = gaussian_relevance(some, compile_query(scene, space, [kind]))[0]
     sure = float(relevance @ weights.to(relevance) / weights.sum())
     taken = {thing.id for thing in (*whole.things, *others)}
     id = next(id for number in itertools.count(1) if (id := f"{kind} {number}") not in taken)
     return _thing(whole, id, kind, sure, rows, areas, seen)
-
-
-def kinds_of(scene: Scene, threshold: float | None = None) -> np.ndarray:
-    """(N,) words of the vocabulary, "" of what answers none: the kind of each Gaussian by itself."""
-    names = list(OWN)
-    compiled = compile_query(scene, language_space(scene.semantics.space), names)
-    best, which = gaussian_relevance(scene.semantics, compiled).max(0)
-    limit = compiled.threshold if threshold is None else threshold
-    return np.where((best >= limit).numpy(), np.array(names)[which.numpy()], "")
 
 
 def _things(whole: Inventory, threshold: float | None, least: float) -> tuple[Thing, ...]:
@@ -271,40 +275,81 @@ def _things(whole: Inventory, threshold: float | None, least: float) -> tuple[Th
     return tuple(sorted(things, key=lambda thing: -max(thing.shares)))
 
 
-def _no_deeper(whole: Inventory, least: float) -> Parts:
-    """The parts; those that are deeper than any thing in as many as stand there."""
+def _no_larger(whole: Inventory, least: float) -> Parts:
+    """The parts; those that are larger than any thing of their kind in as many as stand there."""
     parts, areas, masses = whole.parts, covered_areas(whole.scene.gaussians), whole.shares.sum(0)
     numbers, kinds, cosines = parts.numbers.copy(), [*parts.kinds], [*parts.cosines]
 
-    def fits(rows: Integer[np.ndarray, " n"]) -> bool:
-        return _box(whole, rows, areas)[1][1] <= DEEPEST * whole.metre
+    def fits(rows: Integer[np.ndarray, " n"], kind: str, slack: float = 1.0) -> bool:
+        (width, depth, _), most = _box(whole, rows, areas)[1], largest(kind)
+        return width <= slack * most[0] * whole.metre and depth <= slack * most[1] * whole.metre
+
+    def surely(kind: str) -> float:
+        return SURELY if kind in SEATS else 1.0
 
     shown = _sums(numbers, whole.shares, len(kinds)).max(0)
     large = [n for n, kind in enumerate(kinds) if kind not in (*STRUCTURE, *OPENINGS) and shown[n] >= least]
-    deep = [own for own in (np.flatnonzero(numbers == number) for number in large) if not fits(own)]
-    if not deep:
+    rows = {n: np.flatnonzero(numbers == n) for n in large}
+    big = [own for n, own in rows.items() if not fits(own, kinds[n], surely(kinds[n]))]
+    if not big:
         return parts
     tree = regions_of(whole.given)
     leaves = tree.leaves if whole.surface is None else tree.leaves[whole.surface.numpy()]
-    for own in deep:
-        told = taken_apart(tree, leaves[own], masses[own], least, lambda rows, own=own: fits(own[rows]))
+    for own in big:
+        name = _namer(whole.scene, own, masses[own])
+
+        def one(some: Integer[np.ndarray, " k"], own=own, name=name) -> bool:
+            return fits(own[some], name(some)[0])
+
+        told = taken_apart(tree, leaves[own], masses[own], least, one)
+        told = _whole_seats(whole, own, told, areas, name)
         numbers[own] = np.where(told < 0, -1, len(kinds) + told)
         for number in range(int(told.max(initial=-1)) + 1):
-            rows = own[told == number]
-            kind, cosine = _best_name(whole.scene, rows, masses[rows], tuple(OWN))
+            kind, cosine = name(np.flatnonzero(told == number))
             kinds.append(kind)
             cosines.append(cosine)
     return Parts(numbers, tuple(kinds), tuple(cosines), parts.present)
 
 
-def _best_name(
-    scene: Scene, rows: Integer[np.ndarray, " n"], weights: Float[np.ndarray, " n"], names: Sequence[str]
-) -> tuple[str, float]:
-    """Which of some kinds rows of a scene answer best, and their mean cosine with it."""
+def _whole_seats(
+    whole: Inventory,
+    own: Integer[np.ndarray, " n"],
+    told: Integer[np.ndarray, " n"],
+    areas: np.ndarray,
+    name: Namer,
+) -> Integer[np.ndarray, " n"]:
+    """What rows of a scene were taken apart into, with what is of one seat as one."""
+    pieces = [np.flatnonzero(told == number) for number in range(int(told.max(initial=-1)) + 1)]
+    kinds, into = np.array([name(piece)[0] for piece in pieces]), np.arange(len(pieces) + 1)
+    directions = np.concatenate((_TURNS, _TURNS + math.pi / 2))
+    axes = np.stack((np.cos(directions), np.sin(directions)))  # (2, T)
+    for seat in SEATS:
+        some = np.flatnonzero(kinds == seat)
+        rows = [own[pieces[number]] for number in some]
+        flats = [whole.stands[each[evenly(areas[each])]][:, [0, 2]] @ axes for each in rows]
+        if ends := [np.quantile(flat, ANSWERING.box_quantiles, axis=0) for flat in flats]:
+            into[some] = some[put_together(*np.stack(ends, 1), SEAT * whole.metre)]
+    into[:-1] = np.unique(into[:-1], return_inverse=True)[1]
+    into[-1] = -1
+    return into[told]
+
+
+def _namer(
+    scene: Scene,
+    rows: Integer[np.ndarray, " n"],
+    weights: Float[np.ndarray, " n"],
+    names: Sequence[str] = tuple(OWN),
+) -> Namer:
+    """Tells of some of the rows of a scene, by their places, which of some kinds they answer best, and
+    their mean cosine with it."""
     compiled = compile_query(scene, language_space(scene.semantics.space), names, mode="cosine")
     cosines = gaussian_relevance(scene.semantics.rows(torch.from_numpy(rows)), compiled).numpy()
-    means = cosines @ (weights / weights.sum())
-    return names[int(means.argmax())], float(means.max())
+
+    def name(some: Integer[np.ndarray, " k"]) -> tuple[str, float]:
+        means = cosines[:, some] @ (weights[some] / weights[some].sum())
+        return names[int(means.argmax())], float(means.max())
+
+    return name
 
 
 def _sums(numbers: np.ndarray, shares: np.ndarray, count: int) -> np.ndarray:
@@ -329,18 +374,22 @@ def _thing(
 
 def _box(whole: Inventory, own: np.ndarray, areas: np.ndarray) -> Box:
     """`upright_box` of some rows of the scene."""
-    return upright_box(whole.stands[own[evenly(areas[own])]])
+    return upright_box(whole.stands[own[evenly(areas[own])]], whole.turn)
 
 
-def upright_box(points: Float[np.ndarray, "n 3"]) -> Box:
+def upright_box(points: Float[np.ndarray, "n 3"], walls: float = 0.0) -> Box:
     """Middle, size (width, depth, height), turn in degrees and height of the bottom of points in the world.
 
     Extents are from the 2nd to the 98th of a hundred points.
+
+    Args:
+        walls: their turn in degrees, which the box has unless another saves `LISTING.saves` of its area.
     """
     heights = np.quantile(-points[:, 1], ANSWERING.box_quantiles)
     flat = points[:, [0, 2]]
     options = []
-    for turn in _TURNS:
+    turns = math.radians(walls) + _TURNS
+    for turn in turns:
         axes = np.array([[math.cos(turn), math.sin(turn)], [-math.sin(turn), math.cos(turn)]])
         low, high = np.quantile(flat @ axes.T, ANSWERING.box_quantiles, axis=0)
         options.append((float(np.prod(high - low + 0.02 * (high - low).max())), axes, low, high))
@@ -349,7 +398,7 @@ def upright_box(points: Float[np.ndarray, "n 3"]) -> Box:
         best = 0
     _, axes, low, high = options[best]
     east, north = (low + high) / 2 @ axes
-    (width, depth), turn = high - low, math.degrees(_TURNS[best])
+    (width, depth), turn = high - low, math.degrees(turns[best])
     if depth > width:
         width, depth, turn = depth, width, turn + 90
     place = (float(east), float(-heights.mean()), float(north))

@@ -1,4 +1,4 @@
-"""Pieces that are deeper than any thing are taken apart."""
+"""Pieces that are larger than any thing are taken apart."""
 
 from dataclasses import replace
 
@@ -7,7 +7,7 @@ import torch
 from scipy.sparse import csr_array
 
 from langflash_core.inventory import inventory
-from langflash_core.inventory.apart import DEEPEST, taken_apart
+from langflash_core.inventory.apart import DEEPEST, SEAT, put_together, taken_apart
 from langflash_core.scene.regions import Regions
 from tests.boxroom import EYE, METRES, box_room
 from tests.inventory.test_things import with_more
@@ -51,3 +51,46 @@ def test_two_tables_that_touch_are_two_where_one_would_be_too_deep():
     tables = [thing for thing in inventory(both).things if thing.kind == "table"]
     assert len(tables) == 2 and all(thing.size[1] < DEEPEST for thing in tables)
     assert abs(tables[0].place[0] - tables[1].place[0]) > 1
+
+
+def test_what_is_cut_of_a_seat_is_put_together_again_and_two_seats_are_two():
+    """Seat and back of two chairs side by side, from where to where along four directions."""
+    turns = np.radians(np.arange(0, 180, 45))
+    axes = np.stack((np.cos(turns), np.sin(turns)))
+    corners = np.array([(x, y) for x in (0.0, 0.4) for y in (0.0, 0.4)])
+    pieces = [corners + place for place in ((0, 0), (0.05, 0.3), (0.6, 0), (0.65, 0.3), (3, 3))]
+    lows, highs = (np.stack([end(piece @ axes, 0) for piece in pieces]) for end in (np.min, np.max))
+    kept = lows.copy()
+    assert put_together(lows, highs, SEAT).tolist() == [0, 0, 2, 2, 4]
+    assert (lows == kept).all() and put_together(lows, highs, 0.5).tolist() == [0, 1, 2, 3, 4]
+    assert put_together(lows, highs, 9.0).tolist() == [0] * 5
+    assert put_together(lows[:0], highs[:0], SEAT).tolist() == []
+
+
+def test_chairs_that_touch_are_as_many_as_stand_there():
+    """Three in a row, 1.8 m, each of a seat in its own colour and a darker back."""
+    room = box_room(chairs=(), table=None).with_record(metric_scale=METRES)
+    east, north = np.meshgrid(np.arange(0.015, 1.8, 0.03), np.arange(0.0, 0.5, 0.03))
+    points = np.stack((east.ravel() + 1.0, np.full(east.size, 0.45), north.ravel() + 2.6), 1)
+    both = with_more(room, points, "door")
+    own = torch.arange(len(both.gaussians) - len(points), len(both.gaussians))
+    hues = torch.tensor([[1.5, -1.5, -1.5], [-1.5, 1.5, -1.5], [-1.5, -1.5, 1.5]])
+    backs = torch.from_numpy(north.ravel() > 0.3)
+    sh, words, quats = (
+        both.gaussians.sh.clone(),
+        both.semantics.weight_ids.clone(),
+        both.gaussians.quats.clone(),
+    )
+    sh[own, 0] = (
+        hues[torch.from_numpy((east.ravel() / 0.6).astype(int))] * torch.where(backs, 0.5, 1.0)[:, None]
+    )
+    words[own] = 3  # "chair"
+    quats[own] = quats[both.semantics.weight_ids[:, 0] == 1][:1]  # they lie as the floor does
+    gaussians = replace(both.gaussians, sh=sh, quats=quats)
+    both = replace(both, gaussians=gaussians, semantics=replace(both.semantics, weight_ids=words))
+    found = inventory(both)
+    assert found.counts["chair"] == 3
+    chairs = [thing for thing in found.things if thing.kind == "chair"]
+    assert all(max(thing.size[:2]) < SEAT for thing in chairs)
+    gaps = np.diff(sorted(thing.place[0] for thing in chairs))
+    assert np.allclose(gaps, 0.6, atol=0.1)

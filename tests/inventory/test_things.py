@@ -135,6 +135,18 @@ def test_a_box_turns_where_that_saves_room():
     assert size[0] * size[1] == pytest.approx(min(areas), rel=0.02)
 
 
+def test_a_box_is_along_the_walls_however_those_are_turned():
+    """A desk 1.8 m long along a wall that is turned by 23 degrees, whose far end is seen askew."""
+    east, north = np.meshgrid(np.linspace(-0.9, 0.9, 60), np.linspace(-0.35, 0.35, 30))
+    flat = np.stack((east.ravel(), north.ravel() + 0.35 * east.ravel()), 1)
+    turn = math.radians(23)
+    flat = flat @ np.array([[math.cos(turn), math.sin(turn)], [-math.sin(turn), math.cos(turn)]])
+    points = np.stack((flat[:, 0], np.full(len(flat), -0.7), flat[:, 1]), 1)
+    _, size, degrees, _ = upright_box(points, 23)
+    assert degrees % 90 == pytest.approx(23) and size[0] == pytest.approx(1.8, abs=0.1)
+    assert upright_box(points)[2] % 90 != pytest.approx(23)
+
+
 def test_one_point_has_a_box_of_no_size():
     place, size, _, bottom = upright_box(np.array([[1.0, -2.0, 3.0]]))
     assert place == (1.0, -2.0, 3.0) and size == (0.0, 0.0, 0.0) and bottom == 2.0

@@ -151,7 +151,7 @@ class ListParts(SceneTask):
     def run(self, stopping: Asked) -> Iterator[Command]:
         import torch
 
-        from langflash_core.inventory.things import kinds_of
+        from langflash_core.inventory.pieces import kinds_of
         from langflash_core.language.spaces import language_space
         from langflash_core.language.spoken import compile_spoken
         from langflash_core.meant import meant_relevance

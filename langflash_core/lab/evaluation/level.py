@@ -24,8 +24,8 @@ from langflash_core.base.records import World
 from langflash_core.base.running import Progress
 from langflash_core.geometry.rotations import turn_of
 from langflash_core.inventory import Inventory, Thing, inventory
+from langflash_core.inventory.pieces import OPENINGS, STRUCTURE
 from langflash_core.inventory.plan import Plan, floor_plan
-from langflash_core.inventory.things import OPENINGS, STRUCTURE
 from langflash_core.lab.evaluation.bench import files_of
 from langflash_core.lab.evaluation.clicks import judge_clicks
 from langflash_core.lab.evaluation.tables import Measure, Table, by_measure, rounded

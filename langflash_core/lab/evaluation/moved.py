@@ -20,7 +20,7 @@ from langflash_core.base.running import Progress
 from langflash_core.errors import InputError
 from langflash_core.inventory import Inventory, Thing, inventory
 from langflash_core.inventory.beside import difference
-from langflash_core.inventory.things import OPENINGS, STRUCTURE
+from langflash_core.inventory.pieces import OPENINGS, STRUCTURE
 from langflash_core.lab.evaluation.level import (
     drawn_room,
     kept_scene,
