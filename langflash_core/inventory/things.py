@@ -289,7 +289,11 @@ def _no_larger(whole: Inventory, least: float) -> Parts:
 
     shown = _sums(numbers, whole.shares, len(kinds)).max(0)
     large = [n for n, kind in enumerate(kinds) if kind not in (*STRUCTURE, *OPENINGS) and shown[n] >= least]
+    large = [n for n in large if kinds[n] not in SEATS or cosines[n] >= parts.present]
     rows = {n: np.flatnonzero(numbers == n) for n in large}
+    rows = {
+        n: own for n, own in rows.items() if kinds[n] not in SEATS or _is_found(whole, kinds[n], own, areas)
+    }
     big = [own for n, own in rows.items() if not fits(own, kinds[n], surely(kinds[n]))]
     if not big:
         return parts
@@ -311,6 +315,14 @@ def _no_larger(whole: Inventory, least: float) -> Parts:
     return Parts(numbers, tuple(kinds), tuple(cosines), parts.present)
 
 
+def _is_found(whole: Inventory, kind: str, own: Integer[np.ndarray, " n"], areas: np.ndarray) -> bool:
+    """Whether some rows of the scene are as sure of a kind as what is listed."""
+    some = whole.scene.semantics.rows(torch.from_numpy(own))
+    compiled = compile_query(whole.scene, language_space(some.space), [kind])
+    relevance = gaussian_relevance(some, compiled)[0].numpy()
+    return bool(np.average(relevance, weights=areas[own] + 1e-12) >= compiled.threshold)
+
+
 def _whole_seats(
     whole: Inventory,
     own: Integer[np.ndarray, " n"],
@@ -328,7 +340,8 @@ def _whole_seats(
         rows = [own[pieces[number]] for number in some]
         flats = [whole.stands[each[evenly(areas[each])]][:, [0, 2]] @ axes for each in rows]
         if ends := [np.quantile(flat, ANSWERING.box_quantiles, axis=0) for flat in flats]:
-            into[some] = some[put_together(*np.stack(ends, 1), SEAT * whole.metre)]
+            lows, highs = np.stack(ends, 1)
+            into[some] = some[put_together(lows, highs, SEAT * whole.metre)]
     into[:-1] = np.unique(into[:-1], return_inverse=True)[1]
     into[-1] = -1
     return into[told]
