@@ -347,7 +347,7 @@ class Scene:
         return (
             f"Scene: {len(self.gaussians):,} Gaussians{', a layer per photo' * self.layered}; {views}\n"
             f"  {language}; {len(self.photos)} photos kept in it\n"
-            f"  {length}; warnings: {len(self.record.warnings)} (scene.record.warnings)"
+            f"  {length}; warnings when it was made: {len(self.record.warnings)} (scene.record.warnings)"
         )
 
     @property
@@ -445,7 +445,7 @@ class PromptAnswer:
     people, where the phrase may not mean what was written; "" for most. reading: how the phrase was
     understood, head first ("chair, white"); "" where it was asked as it stands. mask: (H, W) bool, its pixels
     in that view, none where it is not found; None where nobody keeps it. lit_from: the value from which a
-    pixel belongs to it.
+    pixel belongs to it. maybe: not found, but nearly.
     """
 
     prompt: str
@@ -459,6 +459,7 @@ class PromptAnswer:
     reading: str = ""
     mask: Bool[Tensor, "H W"] | None = field(default=None, repr=False, compare=False)
     lit_from: float = 0.0
+    maybe: bool = False
 
 
 @dataclass(frozen=True)
@@ -479,7 +480,11 @@ class QueryResult:
     def __repr__(self) -> str:
         """Three lines: of what, what is found, what is not."""
         told = {
-            found: [f"{each.prompt} {each.score:.2f}" for each in self.answers if each.found == found]
+            found: [
+                f"{each.prompt} {each.score:.2f}{' (maybe)' * each.maybe}"
+                for each in self.answers
+                if each.found == found
+            ]
             for found in (True, False)
         }
         return (

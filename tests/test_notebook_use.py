@@ -52,6 +52,8 @@ def test_a_scene_and_an_answer_are_three_lines(room):
     first, second, third = repr(result).splitlines()
     assert "1 of 2 phrases" in first
     assert "  found: couch 1.00" in second and "not found: elephant 0." in third
+    near = replace(result, answers=(result.answers[0], replace(result.answers[1], maybe=True)))
+    assert "(maybe)" not in repr(result) and repr(near).endswith("(maybe)")
     assert all(len(line) < LINE / 3 for told in (room, result) for line in repr(told).splitlines())
 
 

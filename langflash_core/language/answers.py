@@ -156,7 +156,8 @@ def principal_axes(points: Float[Tensor, "n 3"]) -> Float[Tensor, "3 3"]:
 def _one(text: str, score: float, limit: float, mask: Tensor, points: Tensor, values: Tensor) -> PromptAnswer:
     """The answer to one phrase from its final mask (H, W) and its points (n, 3), values (n,)."""
     if len(points) == 0:
-        return PromptAnswer(text, False, score, limit, 0.0, None, None, mask=mask)
+        maybe = ANSWERING.maybe_from(limit) <= score < limit
+        return PromptAnswer(text, False, score, limit, 0.0, None, None, mask=mask, maybe=maybe)
     x, y, z = weighted_centroid(points, values.clamp_min(0)).tolist()
     area = float(mask.float().mean())
     box = oriented_box(_thin_points(points))

@@ -115,7 +115,9 @@ def test_threshold_decides_and_is_checked():
     relevance = blob(slice(10, 30), slice(50, 70), inside=0.6)[None]
     assert answer(relevance, frame(), camera(), query("lamp"), 0.55).answers[0].found
     strict = answer(relevance, frame(), camera(), query("lamp"), 0.7).answers[0]
-    assert (strict.found, strict.threshold) == (False, 0.7)
+    assert (strict.found, strict.maybe, strict.threshold) == (False, False, 0.7)
+    near = answer(relevance, frame(), camera(), query("lamp"), 0.61).answers[0]
+    assert (near.found, near.maybe) == (False, True)
     bad_ones: list[tuple[float, Mode]] = [
         (-0.1, "relevancy"),
         (1.1, "relevancy"),
