@@ -1,16 +1,14 @@
-"""What was behind a part that was taken out: walls and floors go on as planes, under what is left around.
+"""What was behind a part that was taken out: what other photos saw there, and between that and what is
+left around, a surface that runs smoothly from edge to edge.
 
-Where the part covered a pixel and nothing is left there, is a hole. Planes are found among what the views
-show around their holes, but for those that much of it lies behind. A ray through a hole meets the planes that
-lie around it there; it ends at the nearest one that is not before what was taken away: so two walls meet in
-their corner. Where no plane lies around, depth is interpolated from the edge as 1 / z, which a plane's is
-linear in. What another view sees through is not filled.
+Where the part covered a pixel and nothing is left there, is a hole. The view with the largest hole comes
+first. Points that other views see behind the part are put into its picture; between these and the hole's
+edge 1 / z runs smoothly, which a plane's is linear in, so floors, walls and tables go on. What stands before
+the part is no edge. The next view has this surface in its picture, and fills what of its own hole is left.
+Colours run in from the edge, too, with the texture of what is beside (`texture.py`), and each pixel becomes
+a flat Gaussian, with the weights of the nearest known one. Confidences of what is filled are 0.
 
-Every plane becomes a flat picture, in which holes are filled by what is around them (`texture.py`), and one
-flat Gaussian per pixel of its hole, with the weights of the nearest known pixel. Nobody saw any of it:
-confidences of what is filled are 0.
-
-Sizes: H W pixels of a view, h w of a plane's picture, n points.
+Sizes: H W pixels of a view, n points.
 """
 
 from collections.abc import Sequence
@@ -32,10 +30,11 @@ from langflash_core.rig.projected import project_points
 from langflash_core.scene.joining import append_part
 from langflash_core.scene.weights import sparse_weights
 from langflash_core.surface.settings import EXPOSURE
-from langflash_core.types import Camera, Gaussians, Scene
+from langflash_core.types import Camera, Frame, Gaussians, Scene
 
-from .looks import Render, mattes
-from .planes import Plane, planes
+from .looks import Render
+from .photos import nearest_in
+from .taking import Nearby, most_telling, with_fringe
 from .texture import diffuse, heal
 
 _BRIGHTEST = EXPOSURE.gain_range[1] + EXPOSURE.largest_offset  # a photo's white in the scene's light
@@ -43,9 +42,9 @@ _BRIGHTEST = EXPOSURE.gain_range[1] + EXPOSURE.largest_offset  # a photo's white
 
 @dataclass(frozen=True)
 class _View:
-    """What one photo's place shows without the part. rays (H, W, 3) in the world, z = 1 in the camera; eye
-    (3,); colours (H, W, 3); depths (H, W), 0 for nothing; before (H, W), depths with the part; hole, ring
-    (H, W); number of the photo."""
+    """What one photo's place shows without the part, as far as its ring reaches. rays (H, W, 3) in the world,
+    z = 1 in the camera; eye (3,); colours (H, W, 3); depths (H, W), 0 for nothing; before (H, W), depths of
+    the part; hole, ring (H, W); number of the photo."""
 
     camera: Camera
     rays: Float[np.ndarray, "H W 3"]
@@ -74,6 +73,22 @@ class _View:
         return there.inside.numpy(), pixels // width, pixels % width, there.z.numpy()
 
 
+@dataclass(frozen=True)
+class Filled:
+    """gone: (N,) bool, what is to be taken away, the part and its fringe. patch: what comes instead. unseen:
+    share of the holes that no other photo saw."""
+
+    gone: Bool[Tensor, " N"]
+    patch: Scene
+    unseen: float
+
+
+def delete_and_fill(scene: Scene, members: Tensor, render: Render) -> Filled:
+    """A part (N,) bool taken out with its fringe, and what belongs there."""
+    gone = with_fringe(scene, members, render)
+    return Filled(gone, *_filled(scene, gone, render))
+
+
 def fill(scene: Scene, removed: Tensor, render: Render) -> Scene:
     """What belongs where a part was, as Gaussians of the scene's own dictionary, to be appended to what is
     left.
@@ -84,25 +99,32 @@ def fill(scene: Scene, removed: Tensor, render: Render) -> Scene:
     Returns:
         A scene of n >= 0 Gaussians.
     """
-    left = scene.rows(~removed)
-    views = _views(scene, left, removed, render)
-    none = left.rows(torch.zeros(0, dtype=torch.int64))
-    flat, rest = _on_planes(views, _planes_around(views), none) if views else (none, [])
-    for view, missing in zip(views, rest, strict=True):
-        flat = append_part(flat, _fill_smoothly(view, missing, append_part(left, flat), render, none))
-    return flat
+    return _filled(scene, removed, render)[0]
 
 
-def _views(scene: Scene, left: Scene, removed: Tensor, render: Render) -> list[_View]:
-    cameras = [_resize_camera(scene.camera(view)) for view in range(scene.num_views)]
-    shown = mattes(scene, removed, cameras, render)
-    order = sorted(range(len(cameras)), key=lambda view: -float(shown[view][0].sum()))[: FILLING.most_views]
-    found = [
-        _view(left, cameras[v], *shown[v], v, render)
-        for v in order
-        if float(shown[v][0].sum()) >= FILLING.least
-    ]
-    return [view for view in found if view.hole.sum() >= FILLING.least]
+def _filled(scene: Scene, removed: Tensor, render: Render) -> tuple[Scene, float]:
+    """What fills the holes, and the share of them that no other view sees."""
+    patch = scene.rows(torch.zeros(0, dtype=torch.int64))
+    views = sorted(_views(scene, removed, render), key=lambda view: -int(view.hole.sum()))
+    holes = told = 0
+    for view in views:
+        seen = _with_others(view, views)
+        told += int((view.hole & (seen.depths > 0)).sum())
+        holes += int(view.hole.sum())
+        patch = append_part(patch, _fill_view(_with_patch(seen, patch, render), patch))
+    return patch, 1 - told / max(holes, 1)
+
+
+def _views(scene: Scene, removed: Tensor, render: Render) -> list[_View]:
+    """The few views that show most of a part, from different sides."""
+    found, nearby = [], Nearby.of(scene)
+    for number in most_telling(scene, removed, FILLING.most_views):
+        camera = _resize_camera(scene.camera(number))
+        part = nearby.drawn(removed, camera, render, weight_maps=False)
+        if float(part.alphas.sum()) >= FILLING.least:
+            view = _view(nearby, removed, camera, part, number, render)
+            found += [view] if view.hole.sum() >= FILLING.least else []
+    return found
 
 
 def _resize_camera(camera: Camera) -> Camera:
@@ -111,187 +133,123 @@ def _resize_camera(camera: Camera) -> Camera:
     return camera.with_size(max(1, round(camera.width * ratio)), max(1, round(camera.height * ratio)))
 
 
-def _view(left: Scene, camera: Camera, matte: Tensor, before: Tensor, number: int, render: Render) -> _View:
-    frame = render(left, camera)
-    alphas = frame.alphas.cpu().numpy()
-    hole = ((matte.numpy() > 0.1) & (alphas < 0.5)) | ((matte.numpy() >= 0.5) & (alphas < 0.9))
-    size = 2 * max(2, round(FILLING.ring * max(hole.shape))) + 1
-    ring = (cv2.dilate(hole.astype(np.uint8), np.ones((size, size), np.uint8)) > 0) & (alphas >= 0.9) & ~hole
+def _view(nearby: Nearby, removed: Tensor, camera: Camera, part: Frame, number: int, render: Render) -> _View:
+    reach = max(2, round(FILLING.ring * max(camera.width, camera.height)))
+    matte = part.alphas.cpu().numpy()
+    box = _box(matte > 0.1, 2 * reach)
+    camera, matte = _crop(camera, box), matte[box]
+    frame = nearby.drawn(~removed, camera, render)
+    alphas, depths = frame.alphas.cpu().numpy(), frame.depths.cpu().double().numpy()
+    hole = ((matte > 0.1) & (alphas < 0.5)) | ((matte >= 0.5) & (alphas < 0.9))
+    size = np.ones((2 * reach + 1, 2 * reach + 1))
+    ring = (cv2.dilate(hole.astype(np.uint8), size) > 0) & (alphas >= 0.9) & ~hole & (depths > 0)
     pose = invert_rigid(camera.viewmat.cpu().double())
     ahead = rays(camera.K.cpu().double(), camera.width, camera.height) @ pose[:3, :3].T
-    straight = frame.rgb.cpu().numpy() / np.maximum(alphas, 1 / 255)[..., None]
+    straight = frame.rgb.cpu().double().numpy() / np.maximum(alphas, 1 / 255)[..., None]
+    before = np.where(matte > 0.1, part.depths.cpu().double().numpy()[box], 0.0)
     return _View(
-        camera, ahead.numpy(), pose[:3, 3].numpy(), straight.clip(0, _BRIGHTEST).astype(np.float64),
-        np.where(alphas >= 0.9, frame.depths.cpu().numpy(), 0.0).astype(np.float64),
-        before.double().numpy(), hole, ring & (frame.depths.cpu().numpy() > 0),
+        camera, ahead.numpy(), pose[:3, 3].numpy(), straight.clip(0, _BRIGHTEST),
+        np.where(alphas >= 0.9, depths, 0.0), before, hole, ring,
         None if frame.weight_maps is None else frame.weight_maps.cpu().numpy(), number,
     )  # fmt: skip
 
 
-def _planes_around(views: Sequence[_View]) -> list[Plane]:
-    points = np.concatenate([view.points(view.depths)[view.ring] for view in views])
-    depths = np.concatenate([view.depths[view.ring] for view in views])
-    eyes = np.concatenate([np.broadcast_to(view.eye, (int(view.ring.sum()), 3)) for view in views])
-    step = max(1, len(points) // 5000)
-    points, eyes, far = points[::step], eyes[::step], FILLING.far * depths[::step]
-    found = planes(points, far, share=FILLING.share, most=FILLING.most_planes)
-    return [plane for plane in found if _bounds(plane, points, eyes, far)]
+def _box(shown: Bool[np.ndarray, "H W"], margin: int) -> tuple[slice, slice]:
+    """Rows and columns around what is shown, and so many pixels more."""
+    found = []
+    for axis, side in enumerate(shown.shape):
+        along = np.flatnonzero(shown.any(1 - axis))
+        first, last = (along[0], along[-1]) if len(along) else (0, 0)
+        found.append(slice(max(0, int(first) - margin), min(side, int(last) + 1 + margin)))
+    return found[0], found[1]
 
 
-def _bounds(
-    plane: Plane,
-    points: Float[np.ndarray, "n 3"],
-    eyes: Float[np.ndarray, "n 3"],
-    far: Float[np.ndarray, " n"],
-) -> bool:
-    """Whether little of what is around lies behind a plane, as it does behind a chair's back: it goes on."""
-    behind = plane.apart(points) * np.sign(plane.apart(eyes)) < -2 * far
-    return float(behind.mean()) <= FILLING.behind
+def _crop(camera: Camera, box: tuple[slice, slice]) -> Camera:
+    """The camera of a part of its picture."""
+    K, (rows, columns) = camera.K.clone(), box
+    K[0, 2] -= columns.start
+    K[1, 2] -= rows.start
+    return replace(camera, K=K, width=columns.stop - columns.start, height=rows.stop - rows.start)
 
 
-def _on_planes(
-    views: Sequence[_View], found: Sequence[Plane], none: Scene
-) -> tuple[Scene, list[Bool[np.ndarray, "H W"]]]:
-    """The patches of all planes, and the pixels of each view's hole that no plane lies around."""
-    chosen = [_choose_planes(view, found) for view in views]
-    flat = none
-    for number, plane in enumerate(found):
-        spots = [
-            view.points(depth)[which == number] for view, (which, depth) in zip(views, chosen, strict=True)
-        ]
-        if sum(map(len, spots)):
-            flat = append_part(flat, _patch(plane, np.concatenate(spots), views, none))
-    return flat, [view.hole & (which < 0) for view, (which, _) in zip(views, chosen, strict=True)]
+def _with_others(view: _View, views: Sequence[_View]) -> _View:
+    """A view with what other views show behind the part, in the pixels of its hole."""
+    points, colours, weights = [], [], []
+    for other in views:
+        shown = (other.depths > 0) & ~other.hole
+        if other is not view and shown.any():
+            points.append(other.points(other.depths)[shown])
+            colours.append(other.colours[shown])
+            weights.append(None if other.weights is None else other.weights[shown])
+    if not points:
+        return view
+    inside, rows, columns, z = view.pixels(np.concatenate(points))
+    deep = inside & view.hole[rows, columns] & (z >= FILLING.before * view.before[rows, columns])
+    some = np.flatnonzero(deep)[np.argsort(-z[deep], kind="stable")]  # the nearest one stays
+    places = rows[some], columns[some]
+    depths, painted = view.depths.copy(), view.colours.copy()
+    depths[view.hole] = 0
+    depths[places], painted[places] = z[some], np.concatenate(colours)[some]
+    carried = view.weights
+    if carried is not None:
+        carried = carried.copy()
+        carried[places] = np.concatenate([each for each in weights if each is not None])[some]
+    return replace(view, depths=depths, colours=painted, weights=carried)
 
 
-def _choose_planes(
-    view: _View, found: Sequence[Plane]
-) -> tuple[Integer[np.ndarray, "H W"], Float[np.ndarray, "H W"]]:
-    """The plane that each pixel of the hole shows, -1 for none, and its depth there, 0 for none."""
-    which, depth = np.full(view.hole.shape, -1), np.full(view.hole.shape, np.inf)
-    if not found or not view.ring.any():
-        return which, np.zeros_like(depth)
-    points = view.points(view.depths)
-    apart = np.stack([abs(plane.apart(points)) for plane in found])  # (p, H, W)
-    label = np.where(view.ring & (apart.min(0) <= 2 * FILLING.far * view.depths), apart.argmin(0), -1)
-    any_surface = np.asarray(ndimage.distance_transform_edt(~view.ring))
-    for number, plane in enumerate(found):
-        if not (label == number).any():
-            continue
-        reach = np.asarray(ndimage.distance_transform_edt(label != number))
-        down = view.rays @ plane.normal
-        hit = (plane.offset - plane.normal @ view.eye) / np.where(abs(down) > 1e-9, down, 1e-9)
-        steep = abs(down) > FILLING.grazing * np.linalg.norm(view.rays, axis=-1)
-        behind = (hit > FILLING.before * np.where(view.before > 0, view.before, 0)) & (hit > 1e-6)
-        there = view.hole & steep & behind & (reach <= FILLING.reached * any_surface + 3) & (hit < depth)
-        alike = np.array([abs(plane.normal @ other.normal) > FILLING.parallel for other in found])
-        # a curtain's, just before its wall's
-        there &= (which < 0) | ~alike[which] | (hit < FILLING.close * depth)
-        which[there], depth[there] = number, hit[there]
-    return which, np.where(which < 0, 0.0, depth)
+def _with_patch(view: _View, patch: Scene, render: Render) -> _View:
+    """A view with what has been filled so far, which is a hole no more."""
+    if not len(patch.gaussians):
+        return view
+    frame = render(patch.with_record(layered=False), view.camera)
+    alphas = frame.alphas.cpu().numpy()
+    there = view.hole & (alphas >= 0.5)
+    depths, colours = view.depths.copy(), view.colours.copy()
+    depths[there] = frame.depths.cpu().double().numpy()[there]
+    colours[there] = (frame.rgb.cpu().double().numpy() / np.maximum(alphas, 0.5)[..., None])[there]
+    weights = view.weights
+    if weights is not None and frame.weight_maps is not None:
+        weights = np.where(there[..., None], frame.weight_maps.cpu().numpy(), weights)
+    return replace(view, depths=depths, colours=colours, weights=weights, hole=view.hole & ~there)
 
 
-def _patch(plane: Plane, spots: Float[np.ndarray, "n 3"], views: Sequence[_View], none: Scene) -> Scene:
-    """One plane's hole as Gaussians. spots: where rays through holes meet it."""
-    basis, pitch, low, shape = _raster(plane, spots, views)
-    places = np.floor((spots @ basis.T - low) / pitch).astype(int)[:, ::-1].clip(0, np.array(shape) - 1)
-    hole = np.zeros(shape, bool)
-    hole[tuple(places.T)] = True
-    hole = cv2.morphologyEx(hole.astype(np.uint8), cv2.MORPH_CLOSE, np.ones((5, 5), np.uint8)) > 0
-    rows, columns = np.indices(shape)
-    along = low + pitch * (np.stack((columns, rows), -1) + 0.5)
-    points = along @ basis + plane.normal * plane.offset  # (h, w, 3)
-    on_it = FILLING.far * min(max(FILLING.noise * plane.noise, FILLING.narrowest), 2.0)
-    colours, weights, known, taken = _sample_views(points.reshape(-1, 3), views, on_it)
-    known = known if weights is None else known & _common(weights, known)
-    known = known.reshape(shape)
-    hole &= ~taken.reshape(shape)
-    if not hole.any():
+def _fill_view(view: _View, patch: Scene) -> Scene:
+    """A view's hole as Gaussians, on a surface that runs smoothly from what is known to what is known."""
+    none = patch.rows(torch.zeros(0, dtype=torch.int64))
+    limits = nearest_in(view.before, view.before > 0) if view.before.any() else view.before
+    known = (view.depths > 0) & (view.depths >= FILLING.before * limits)
+    if view.hole.sum() < FILLING.least or not known.any():
         return none
-    coloured = heal(colours.reshape(*shape, 3), known, hole)
-    nearest = _nearest(known) if known.any() else np.zeros((2, *shape), int)
-    carried = None if weights is None else weights.reshape(*shape, -1)[nearest[0][hole], nearest[1][hole]]
-    axes = np.broadcast_to(np.stack((*basis, np.cross(*basis)), -1), (int(hole.sum()), 3, 3))
-    sizes = np.full((len(axes), 2), pitch * FILLING.cover)
-    return _elements(none, points[hole], axes, sizes, coloured[hole], carried, views[0].number)
-
-
-def _raster(
-    plane: Plane, spots: Float[np.ndarray, "n 3"], views: Sequence[_View]
-) -> tuple[Float[np.ndarray, "2 3"], float, Float[np.ndarray, " 2"], tuple[int, int]]:
-    """Axes of a plane's picture, the side of its pixels, its low corner, and its size (h, w), with
-    surroundings."""
-    basis = plane.basis()
-    flat = spots @ basis.T
-    nearest = min(float(np.median(np.linalg.norm(spots - view.eye, axis=1))) for view in views)
-    pitch = FILLING.cell * nearest / float(views[0].camera.K[0, 0])
-    low, high = np.quantile(flat, 0.002, axis=0), np.quantile(flat, 0.998, axis=0)
-    margin = 0.6 * float((high - low).max()) + 8 * pitch
-    low, high = low - margin, high + margin
-    pitch = max(pitch, float(np.sqrt(np.prod(high - low) / FILLING.most_cells)))
-    width, height = np.ceil((high - low) / pitch).astype(int).clip(1).tolist()
-    return basis, pitch, low, (height, width)
-
-
-def _common(weights: Float[np.ndarray, "n K"], known: Bool[np.ndarray, " n"]) -> Bool[np.ndarray, " n"]:
-    """Points that mean what most of a plane's known ones do: a curtain before a wall does not."""
-    if not weights.shape[1] or not known.any():
-        return np.ones_like(known)
-    groups = weights.argmax(1)
-    counts = np.bincount(groups[known], minlength=weights.shape[1])
-    return (counts >= FILLING.rare * counts.max())[groups]
-
-
-def _sample_views(
-    points: Float[np.ndarray, "n 3"], views: Sequence[_View], on_it: float
-) -> tuple[
-    Float[np.ndarray, "n 3"], Float[np.ndarray, "n K"] | None, Bool[np.ndarray, " n"], Bool[np.ndarray, " n"]
-]:
-    """Colours and weights of points where a view shows a surface just there, whether one does, and whether
-    one sees through them, or a surface about there. on_it: share of the depth to which a surface counts."""
-    count, kept = len(points), views[0].weights
-    colours, known, taken = np.zeros((count, 3)), np.zeros(count, bool), np.zeros(count, bool)
-    weights = None if kept is None else np.zeros((count, kept.shape[-1]), np.float32)
-    for view in views:
-        inside, rows, columns, z = view.pixels(points)
-        depth = view.depths[rows, columns]
-        open_there = inside & ~view.hole[rows, columns] & (depth > 0)
-        taken |= open_there & ((depth > FILLING.through * z) | (abs(depth - z) <= 2 * FILLING.far * z))
-        new = open_there & (abs(depth - z) <= on_it * z) & ~known
-        colours[new] = view.colours[rows[new], columns[new]]
-        if weights is not None and view.weights is not None:
-            weights[new] = view.weights[rows[new], columns[new]]
-        known |= new
-    return colours, weights, known, taken
-
-
-def _fill_smoothly(
-    view: _View, missing: Bool[np.ndarray, "H W"], sofar: Scene, render: Render, none: Scene
-) -> Scene:
-    """Pixels that no plane lies around, on a surface that runs smoothly from their edge to their edge."""
-    if missing.sum() < FILLING.least:
-        return none
-    frame = render(sofar, view.camera, weight_maps=False)
-    alphas, depths = frame.alphas.cpu().numpy(), frame.depths.cpu().double().numpy()
-    missing = missing & (alphas < 0.5)
-    known = (alphas >= 0.9) & (depths > 0) & ~missing
-    if missing.sum() < FILLING.least or not known.any():
-        return none
-    straight = (frame.rgb.cpu().numpy() / np.maximum(alphas, 1 / 255)[..., None]).clip(0, _BRIGHTEST)
-    inverse = np.repeat((1 / np.maximum(depths, 1e-9))[..., None], 3, -1)
-    depth = torch.from_numpy(1 / np.maximum(diffuse(inverse, known)[..., 0], 1e-9))
+    hole = view.hole.astype(np.uint8)
+    rim = cv2.dilate(hole, np.ones((2 * FILLING.rim + 1, 2 * FILLING.rim + 1))) > 0
+    clear = known & (~rim | view.hole)
+    clear = clear if clear.any() else known
+    inverse = np.repeat((1 / np.maximum(view.depths, 1e-9))[..., None], 3, -1)
+    depth = torch.from_numpy(1 / np.maximum(diffuse(inverse, clear)[..., 0], 1e-9))
+    colours = heal(view.colours, clear, rim & ~clear, _like_edge(view, clear, rim))
     points = unproject(depth, view.camera.K.cpu().double())
-    footprint = depth / float(view.camera.K[0, 0])
-    axes, sizes = ellipses(*spans(points, footprint))
+    axes, sizes = ellipses(*spans(points, depth / float(view.camera.K[0, 0])))
     pose = invert_rigid(view.camera.viewmat.cpu().double())
+    missing = view.hole
     rows = torch.from_numpy(missing)
-    nearest = _nearest(known)
+    nearest = _nearest(clear)
     carried = None if view.weights is None else view.weights[nearest[0][missing], nearest[1][missing]]
     return _elements(
         none, transform(pose, points[rows]).numpy(), (pose[:3, :3] @ axes[rows]).numpy(),
-        FILLING.cover * sizes[rows].clamp_min(1e-6).numpy(), diffuse(straight, known)[missing],
-        carried, view.number,
+        FILLING.cover * sizes[rows].clamp_min(1e-6).numpy(), colours[missing], carried, view.number,
     )  # fmt: skip
+
+
+def _like_edge(
+    view: _View, clear: Bool[np.ndarray, "H W"], rim: Bool[np.ndarray, "H W"]
+) -> Bool[np.ndarray, "H W"]:
+    """Pixels of groups that the hole's edge mostly shows: other things nearby are not copied into it."""
+    if view.weights is None or not view.weights.shape[-1]:
+        return clear
+    groups = view.weights.argmax(-1)
+    edge = clear & (cv2.dilate(rim.astype(np.uint8), np.ones((5, 5))) > 0)
+    counts = np.bincount(groups[edge], minlength=view.weights.shape[-1])
+    return (counts >= FILLING.rare * counts.sum())[groups]
 
 
 def _nearest(known: Bool[np.ndarray, "H W"]) -> Integer[np.ndarray, "2 H W"]:

@@ -25,6 +25,7 @@ from langflash_core.mending.settings import HIDING, RECIPE_DEFAULTS
 from langflash_core.rig.projected import project_points
 from langflash_core.scene.instances import instances
 from langflash_core.scene.joining import append_part
+from langflash_core.splat.frustum import may_touch
 from langflash_core.surface.prune import sparser
 from langflash_core.types import Camera, Scene
 
@@ -143,7 +144,12 @@ def _reach_margins(scene: Scene, members: Tensor, render: Render) -> tuple[list[
     cameras = [scene.camera(view) for view in range(scene.num_views)]
     means, margins = scene.gaussians.means.cpu(), []
     least = torch.where(members, 0.0, torch.inf)
-    for camera, (matte, depths) in zip(cameras, mattes(scene, members, cameras, render), strict=True):
+    part = scene.gaussians.rows(members)
+    for camera in cameras:
+        if not may_touch(part, camera).any():
+            margins.append(np.full((camera.height, camera.width), np.inf, np.float32))
+            continue
+        ((matte, depths),) = mattes(scene, members, [camera], render)
         margins.append(reaches((matte >= HIDING.matte).numpy()))
         inside, pixels, near = _lying_in(means, camera, depths)
         own = torch.zeros_like(near) if scene.view_ids is None else scene.view_ids.cpu() == len(margins) - 1

@@ -10,6 +10,7 @@ Sizes: H W pixels of a view, h w of its photo.
 import cv2
 import numpy as np
 from jaxtyping import Bool, Float, UInt8
+from scipy.ndimage import distance_transform_edt
 
 from langflash_core.base.picture_files import decoded_photo, encoded
 from langflash_core.errors import SceneFileError
@@ -34,6 +35,12 @@ def reaches(mask: Bool[np.ndarray, "H W"]) -> Float[np.ndarray, "H W"]:
         return np.full(mask.shape, np.inf, np.float32)
     far = cv2.distanceTransform((~mask).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
     return np.where(far <= HIDDEN_PHOTOS.least, 0.0, far / max(mask.shape)).astype(np.float32)
+
+
+def nearest_in(values: Float[np.ndarray, "H W"], mask: Bool[np.ndarray, "H W"]) -> Float[np.ndarray, "H W"]:
+    """Of each pixel the value of the nearest one of a mask, which is not empty."""
+    rows, columns = np.asarray(distance_transform_edt(~mask, return_distances=False, return_indices=True))
+    return values[rows, columns]
 
 
 def painted_over(scene: Scene, view: int, mask: Bool[np.ndarray, "H W"], render: Render) -> bytes:

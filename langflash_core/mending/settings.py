@@ -85,42 +85,18 @@ class Filling:
     """Times the views' own grid at which they are looked at."""
     most_side: int = 512
     """Pixels of the longer side of that."""
-    most_views: int = 12
-    """Views that are filled, those with the largest holes."""
+    most_views: int = 6
+    """Views that are looked at; from between them little more is open."""
     least: int = 12
     """Pixels of a hole."""
     ring: float = 0.08
-    """Of the longer side: what counts as around."""
-    far: float = 0.012
-    """Of the depth: what lies on a plane."""
-    share: float = 0.08
-    """Of the points around a hole, that a plane holds at the least."""
-    most_planes: int = 6
-    """Planes around a hole."""
-    reached: float = 2.5
-    """Times as far as the nearest surface around: so far a plane goes on."""
+    """Of the longer side: what is around a hole, of which its texture is made; twice that is drawn."""
+    rim: int = 2
+    """Pixels around a hole that still have the part's colours."""
     before: float = 0.97
     """Of the depth of what was taken away: nearer is no background."""
-    through: float = 1.05
-    """Times as deep: there another view sees through."""
-    cell: float = 1.4
-    """Pixels of a view from one Gaussian that fills to the next."""
-    most_cells: int = 150_000
-    """Of a plane's grid."""
-    behind: float = 0.3
-    """Of what is around a hole, that may lie behind a plane."""
-    grazing: float = 0.04
-    """Sine of the angle between a ray and a plane, below which they do not meet."""
-    parallel: float = 0.9
-    """Cosine of planes that are alike,"""
-    close: float = 0.8
-    """and of their depths, the nearer by the farther: of such two the one that more lies on goes on."""
-    noise: float = 3.0
-    """Deviations of a plane's own points that still lie on it,"""
-    narrowest: float = 0.25
-    """and tolerances, at the least."""
-    rare: float = 0.2
-    """Of the commonest group's share of a plane: rarer groups are things before it."""
+    rare: float = 0.1
+    """Of a hole's edge: groups that hold less of it are things beside it, which nobody wants copied."""
 
 
 FILLING = Filling()
@@ -225,15 +201,38 @@ CRUMBS = Crumbs()
 
 
 @dataclass(frozen=True)
+class Taking:
+    """What goes with a part that is taken out (`mending.taking`)."""
+
+    shown: float = 0.1
+    """Of a pixel's light: it shows the part from there on."""
+    margin: float = 0.01
+    """Of a photo's longer side: so far colours of a thing run over its edge."""
+    beside: float = 1.04
+    """Times as deep as the part, either way: at its depth, as far as photos agree on that."""
+    room: float = 0.05
+    """Of the diagonal of the part's box, around it: what other layers have in its place lies there."""
+
+
+TAKING = Taking()
+
+
+@dataclass(frozen=True)
 class Texture:
     """Texture that is carried on (`mending.texture`)."""
 
-    band: int = 4
-    """Pixels around the hole that a shift has to fit."""
-    steps: int = 24
-    """Shifts tried along each axis, to either side."""
-    known: float = 0.97
-    """Share of the hole and its band that must be known where they are shifted to."""
+    reach: int = 3
+    """Pixels of a patch to each side of its middle."""
+    means: float = 0.03
+    """Of a colour's range: so far means of patches differ, as light does along a wall."""
+    decay: float = 1.3
+    """By which a pixel counts less for each pixel that it is farther from what is known (Wexler)."""
+    usual: float = 0.75
+    """Quantile of what patches differ by, which is the variance of their weights (Wexler)."""
+    rounds: int = 3
+    """Times that patches are sought and the hole is painted, at full size; at half of it twice as often."""
+    fewest: int = 200
+    """Patches that are known; with fewer only colours run in."""
 
 
 TEXTURE = Texture()

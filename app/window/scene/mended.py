@@ -26,7 +26,6 @@ if TYPE_CHECKING:
     from langflash_core.types import Frame, Scene
 
 MOST_SIDE = 720  # pixels of the picture that a brush is looked at in
-_EDGE = 0.01  # of a photo's longer side: so far colours of a thing run over its edge
 
 
 @dataclass(frozen=True)
@@ -36,8 +35,7 @@ class FillHole(OnShow):
     def run(self, serial: int, progress: Callable[[str, float], None], cancelled: Asked) -> Merged:
         import torch
 
-        from langflash_core.mending.filling import fill
-        from langflash_core.mending.hiding import preview
+        from langflash_core.mending.filling import delete_and_fill
         from langflash_core.mending.looks import draw_scene
         from langflash_core.scene.edited import there
 
@@ -46,12 +44,12 @@ class FillHole(OnShow):
         kept = marks.left.rows()[: marks.there[0]]
         shown = there(own.memory.changed(marks), marks).rows(torch.from_numpy(kept))
         render = _watched(draw_scene, progress, cancelled)
-        gone = preview(shown, torch.from_numpy(marks.selected.rows()[: len(kept)][kept]), render, _EDGE)
-        patch, rows = fill(shown, gone, render), np.zeros(marks.selected.count, bool)
-        rows[np.flatnonzero(kept)] = gone.numpy()
-        taken = Mask.of(rows)
-        info, beyond = _with_part(self, patch, serial), len(taken - marks.selected)
-        return Merged(own.serial, marks.there, info, own.name, taken, beyond=beyond)
+        members = torch.from_numpy(marks.selected.rows()[: len(kept)][kept])
+        filled, rows = delete_and_fill(shown, members, render), np.zeros(marks.selected.count, bool)
+        rows[np.flatnonzero(kept)] = filled.gone.numpy()
+        taken, info = Mask.of(rows), _with_part(self, filled.patch, serial)
+        beyond = len(taken - marks.selected)
+        return Merged(own.serial, marks.there, info, own.name, taken, beyond=beyond, unseen=filled.unseen)
 
 
 @dataclass(frozen=True)

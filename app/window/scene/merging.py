@@ -12,6 +12,7 @@ from ..state import State
 from .commands import SceneArrived, room_of
 from .state import Job, SceneInfo
 
+_UNSEEN, _ALL_UNSEEN = 0.1, 0.995  # shares of what fills a hole, from which people are told
 NOTHING_TO_MERGE = "There is no scene to merge into; open one first."
 
 
@@ -83,7 +84,8 @@ def can_grow(state: State, count: int) -> bool:
 class Merged:
     """The scene with number `serial`, of which there was so much, and another as one scene; or, where `gone`
     says what was taken away, what fills its hole, or stands for it but is not what is `denied`; or `copied`,
-    copies of what was selected, or laid over what is `gone`. beyond: how much of `gone` was not selected."""
+    copies of what was selected, or laid over what is `gone`. beyond: how much of `gone` was not selected.
+    unseen: share of what fills the hole that no photo saw."""
 
     serial: int
     there: tuple[int, int]
@@ -93,14 +95,21 @@ class Merged:
     copied: bool = False
     denied: str = ""
     beyond: int = 0
+    unseen: float = 0.0
 
     @property
     def said(self) -> str:
         """What people should know of it, or nothing."""
-        if not self.beyond or self.gone is None:
+        if self.gone is None:
             return ""
-        own = len(self.gone) - self.beyond
-        return f"{self.beyond:,} Gaussians behind it and along its edge went with the {own:,} selected."
+        own, told = len(self.gone) - self.beyond, []
+        if self.beyond:
+            why = "along its edge, or in its place in other photos,"
+            told.append(f"{self.beyond:,} Gaussians {why} went with the {own:,} selected.")
+        if self.unseen >= _UNSEEN:
+            share = f"{self.unseen:.0%} of " if self.unseen < _ALL_UNSEEN else ""
+            told.append(f"No photo shows {share}what was behind it, so what is around goes on there.")
+        return " ".join(told)
 
     def fits(self, state: State) -> bool:
         """Whether it still holds the scene on show."""

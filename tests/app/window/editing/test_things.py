@@ -15,6 +15,7 @@ from app.window.editing.state import Tool
 from app.window.editing.things import Outlined, SetLevel, StepLevel, ThingFound
 from app.window.frame import table
 from app.window.scene import commands as show
+from app.window.scene.merging import Merged
 from app.window.state import State
 from langflash_core.scene.mask import Mask
 from tests.app.window.desk import Bare
@@ -123,10 +124,18 @@ def test_things_are_prepared_once_the_tool_is_taken(clicked: State) -> None:
     assert list(work.regions_in(prepares.memory)) == [], "it is kept"
 
 
-def test_what_filling_takes_beyond_the_selection_is_said(desk: Desk) -> None:
+def test_what_filling_takes_beyond_the_selection_and_what_no_photo_saw_is_said(desk: Desk) -> None:
     desk.perform(mending.FillSelection())
     desk.work()
     beyond = desk.state.editing.num_deleted - BLOCK
-    (toast,) = [each for each in desk.state.toasts if "along its edge" in each.text]
-    assert toast.text == f"{beyond:,} Gaussians behind it and along its edge went with the 2,500 selected."
-    assert 0 < beyond < BLOCK / 2
+    assert 0 <= beyond < BLOCK / 20  # the block stands free, and has no layers
+    told = [each.text for each in desk.state.toasts]
+    assert any("what was behind it, so what is around goes on there." in text for text in told), told
+    info = desk.state.scene.info
+    assert info is not None
+    filled = Merged(1, (9, 9), info, "a room", Mask.first(9, 5), beyond=2)
+    why = "along its edge, or in its place in other photos,"
+    assert filled.said == f"2 Gaussians {why} went with the 3 selected."
+    half = replace(filled, beyond=0, unseen=0.5)
+    assert half.said == "No photo shows 50% of what was behind it, so what is around goes on there."
+    assert not replace(filled, beyond=0, unseen=0.01).said
