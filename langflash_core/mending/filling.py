@@ -185,6 +185,9 @@ def _with_others(view: _View, views: Sequence[_View]) -> _View:
         return view
     inside, rows, columns, z = view.pixels(np.concatenate(points))
     deep = inside & view.hole[rows, columns] & (z >= FILLING.before * view.before[rows, columns])
+    hit = np.zeros(view.hole.shape, np.float32)
+    hit[rows[deep], columns[deep]] = 1
+    deep &= (cv2.blur(hit, (3, 3)) >= FILLING.dense)[rows, columns]
     some = np.flatnonzero(deep)[np.argsort(-z[deep], kind="stable")]  # the nearest one stays
     places = rows[some], columns[some]
     depths, painted = view.depths.copy(), view.colours.copy()

@@ -95,6 +95,8 @@ class Filling:
     """Pixels around a hole that still have the part's colours."""
     before: float = 0.97
     """Of the depth of what was taken away: nearer is no background."""
+    dense: float = 0.6
+    """Of the pixels around one, that other views see behind the part: fewer are errors of depth."""
     rare: float = 0.1
     """Of a hole's edge: groups that hold less of it are things beside it, which nobody wants copied."""
 
@@ -204,12 +206,14 @@ CRUMBS = Crumbs()
 class Taking:
     """What goes with a part that is taken out (`mending.taking`)."""
 
-    shown: float = 0.1
+    shown: float = 0.5
     """Of a pixel's light: it shows the part from there on."""
     margin: float = 0.01
     """Of a photo's longer side: so far colours of a thing run over its edge."""
-    beside: float = 1.04
+    beside: float = 1.03
     """Times as deep as the part, either way: at its depth, as far as photos agree on that."""
+    far: float = 0.02
+    """Of the part's Gaussians along an axis, to each side: they may lie far off, where depth went wrong."""
     room: float = 0.05
     """Of the diagonal of the part's box, around it: what other layers have in its place lies there."""
 
@@ -231,6 +235,8 @@ class Texture:
     """Quantile of what patches differ by, which is the variance of their weights (Wexler)."""
     rounds: int = 3
     """Times that patches are sought and the hole is painted, at full size; at half of it twice as often."""
+    most: int = 12_000
+    """Patches of a hole that are sought again at a size; more keep what half of it found: seconds."""
     fewest: int = 200
     """Patches that are known; with fewer only colours run in."""
 

@@ -17,7 +17,7 @@ from torch import Tensor
 from langflash_core.geometry.cameras import invert_rigid
 from langflash_core.geometry.nearness import Nearness
 from langflash_core.mending.settings import TAKING
-from langflash_core.rig.projected import project_points
+from langflash_core.rig.projected import Projected, project_points
 from langflash_core.splat.compose import blend_layers
 from langflash_core.splat.frustum import may_touch
 from langflash_core.types import Camera, Frame, Scene
@@ -57,41 +57,42 @@ class Nearby:
 
 def with_fringe(scene: Scene, members: Tensor, render: Render) -> Tensor:
     """(N,) bool: a part (N,) bool, and what has to go with it."""
-    gone, counts = members.clone(), _counts(scene, members)
-    places = (_around(scene, members) & ~members).nonzero()[:, 0]
-    means, own = scene.gaussians.means[places].double().T, scene.view_ids if scene.layered else None
-    for view in counts.nonzero()[:, 0].tolist():
-        camera, shown = scene.camera(view), members
-        if own is not None:
-            shown = members & ((own == view) | (own < 0))
+    gone, own = members.clone(), scene.view_ids if scene.layered else None
+    around = _around(scene, members)
+    for view in _counts(scene, members).nonzero()[:, 0].tolist():
+        camera, layer = scene.camera(view), None if own is None else own == view
+        shown = members if own is None or layer is None else members & (layer | (own < 0))
         part = scene.rows(shown.nonzero()[:, 0]).with_record(layered=False)
         frame = render(part, camera, weight_maps=False)
         mask = (frame.alphas >= TAKING.shown).cpu().numpy()
         if not mask.any():
             continue
-        near = torch.from_numpy(reaches(mask)).flatten()
+        margins = torch.from_numpy(reaches(mask)).flatten()
         depths = torch.from_numpy(nearest_in(frame.depths.cpu().numpy(), mask)).double().flatten()
-        there = project_points(
-            means, camera.viewmat.double(), camera.K.double(), (camera.height, camera.width)
-        )
-        apart, margin = there.z / there.looked_up(depths), there.looked_up(near)
-        found = there.inside & (apart >= 1 / TAKING.beside)
-        same = (apart <= TAKING.beside) & there.looked_up(torch.from_numpy(mask).flatten())
-        fringe = margin <= TAKING.margin
-        fringe &= apart <= TAKING.beside if own is None else own[places] == view
-        gone[places[found & (same | fringe)]] = True
+        for rows, margin in ((around, 0.0 if own is not None else TAKING.margin), (layer, TAKING.margin)):
+            if rows is None:
+                continue
+            places = (rows & ~gone).nonzero()[:, 0]
+            there = _seen(scene, places, camera)
+            apart = there.z / there.looked_up(depths)
+            found = there.inside & (there.looked_up(margins) <= margin) & (apart >= 1 / TAKING.beside)
+            gone[places[found if rows is layer else found & (apart <= TAKING.beside)]] = True
     return gone
 
 
+def _seen(scene: Scene, places: Tensor, camera: Camera) -> Projected:
+    """Where some Gaussians lie in a picture."""
+    means, size = scene.gaussians.means[places].double().T, (camera.height, camera.width)
+    return project_points(means, camera.viewmat.double(), camera.K.double(), size)
+
+
 def _around(scene: Scene, members: Tensor) -> Tensor:
-    """(N,) bool: what may be in a part's place, beside it or behind it in its layer."""
+    """(N,) bool: what lies in the box around a part, but for the few that are far from the rest of it."""
     means = scene.gaussians.means
-    low, high = means[members].amin(0), means[members].amax(0)
+    own = np.quantile(means[members].numpy(), (TAKING.far, 1 - TAKING.far), axis=0)
+    low, high = torch.from_numpy(own).to(means)
     room = TAKING.room * (high - low).norm()
-    around = ((means >= low - room) & (means <= high + room)).all(1)
-    if scene.layered and scene.view_ids is not None:
-        around |= torch.isin(scene.view_ids, scene.view_ids[members & (scene.view_ids >= 0)].unique())
-    return around
+    return ((means >= low - room) & (means <= high + room)).all(1)
 
 
 def most_telling(scene: Scene, part: Tensor, most: int) -> list[int]:

@@ -49,7 +49,7 @@ def heal(
             continue
         found = patches.begun(draws, found)
         patches = patches if level == len(pictures) - 1 else patches.voted(found)
-        for _ in range(TEXTURE.rounds << level):
+        for _ in range(TEXTURE.rounds << level if len(patches.rows) <= TEXTURE.most else 0):
             found = patches.improved(found, draws)
             patches = patches.voted(found)
         pictures[level] = patches.evened(found)
