@@ -76,3 +76,23 @@ def test_spread_reaches_everything_and_keeps_what_is_even():
     known[3, 4] = True
     assert np.allclose(diffuse(np.full((30, 200, 3), 0.3), known), 0.3, atol=1e-4)
     assert not diffuse(np.ones((5, 5, 3)), np.zeros((5, 5), bool)).any()
+
+
+def test_nothing_is_copied_that_is_not_to_be():
+    """A dark thing beside the hole, which reaches into its edge's colours, is not painted into it."""
+    y, x = np.mgrid[:60, :80]
+    wall = np.full((60, 80, 3), 0.7) + 0.02 * np.sin(x * 0.8)[..., None]
+    hole = (abs(y - 30) < 10) & (abs(x - 40) < 10)
+    thing = (abs(y - 30) < 25) & (abs(x - 60) < 9)
+    shown = np.where(thing[..., None], 0.1, wall)
+    filled = heal(np.where(hole[..., None], 0, shown), ~hole & ~thing, hole, ~thing)
+    assert filled[hole].min() > 0.6
+
+
+def test_one_edge_of_light_goes_on_across_a_hole():
+    """A line between floor and wall meets itself, where colours that run in alone blur it."""
+    shown = np.where((np.mgrid[:96, :96][0] > 48)[..., None], 0.3, 0.8) * np.ones(3)
+    hole = np.hypot(*(np.mgrid[:96, :96] - 48)) < 20
+    damaged = np.where(hole[..., None], 0, shown)
+    better, smooth = heal(damaged, ~hole, hole), diffuse(damaged, ~hole)
+    assert psnr(better, shown, hole) > psnr(smooth, shown, hole) + 3

@@ -8,7 +8,6 @@ import torch
 from langflash_core.mending.filling import delete_and_fill
 from langflash_core.mending.settings import FILLING
 from langflash_core.mending.taking import Nearby, most_telling, with_fringe
-from langflash_core.scene.joining import append_part
 
 
 def test_only_what_is_beside_and_behind_goes_with_a_part(known, draw):
@@ -61,10 +60,3 @@ def test_some_gaussians_are_drawn_as_the_whole_scene_blends_them(known, draw):
     nearby, whole = Nearby.of(scene).drawn(every, camera, draw), draw(scene, camera)
     assert np.allclose(nearby.rgb.numpy(), whole.rgb.numpy(), atol=1e-5)
     assert np.allclose(nearby.alphas.numpy(), whole.alphas.numpy(), atol=1e-5)
-
-
-def test_what_another_photo_saw_is_not_made_up(known, draw):
-    filled = delete_and_fill(known.scene, known.members, draw)
-    assert 0 <= filled.unseen < 1
-    done = append_part(known.scene.rows(~filled.gone), filled.patch)
-    assert len(done.gaussians) == int((~filled.gone).sum()) + len(filled.patch.gaussians)
