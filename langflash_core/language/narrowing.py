@@ -64,6 +64,8 @@ class Sight:
 
     def cut(self, head: str, members: Bool[np.ndarray, " n"]) -> list[Thing]:
         """The connected parts of some members."""
+        if not members.any():
+            return []
         numbers = self.parts(members)
         rows = np.flatnonzero(numbers >= 0)
         order = rows[np.argsort(numbers[rows], kind="stable")]
@@ -105,7 +107,7 @@ def _looking(things: list[Thing], modifier: Modifier, sight: Sight, head: str) -
     chroma = np.hypot(sight.colours[:, 1], sight.colours[:, 2])
     if LOOKS[modifier.word].hue and np.quantile(chroma, NARROWING.most_colourful) < NARROWING.grey:
         return things, f"its picture has no colours, so nothing here can be told to be {modifier.word}"
-    for judged in (looking, tinted):
+    for judged in (looking, tinted) if LOOKS[modifier.word].hue else (looking,):
         well = judged(sight.colours, modifier.word)
         parts = _parted(things, sight, head, well)
         shares = np.array([float(well[each.rows].mean()) for each in parts])

@@ -21,28 +21,25 @@ def called_part(
 ) -> Bool[np.ndarray, " m"] | None:
     """What of a thing is called by a look, where the rest clearly is of another colour; None where that is
     shade, or too little, or the look is all over it. What is between is of the part that is more like it.
+    Some places are judged, by those around them; every other is as the nearest of them is.
 
     Args:
         colours: CIELAB. well: how well each place is called so.
     """
-    even = _evened(thing.places, np.column_stack((well, colours)))
-    called, shades = even[:, 0], even[:, 1:] * (PARTING.shade, 1, 1)
+    some = _some(np.arange(len(thing.places)))
+    tree = _tree(thing.places[some])
+    around = tree.query(thing.places[some], min(PARTING.around, len(some)))[1].reshape(len(some), -1)
+    called = well[some][around].mean(1)
+    shades = colours[some][around].mean(1) * (PARTING.shade, 1, 1)
     low, high = PARTING.clearly
     part, rest = called >= high, called <= low
     if min(part.mean(), rest.mean()) < PARTING.cut:
         return None
-    one, other = (np.median(shades[some], 0) for some in (part, rest))
+    one, other = (np.median(shades[own], 0) for own in (part, rest))
     if np.linalg.norm(one - other) < PARTING.another:
         return None
     nearer = np.linalg.norm(shades - one, axis=1) < np.linalg.norm(shades - other, axis=1)
-    return part | nearer
-
-
-def _evened(places: Float[np.ndarray, "m 3"], values: Float[np.ndarray, "m c"]) -> Float[np.ndarray, "m c"]:
-    """Each value as the mean of those around it."""
-    some = _some(np.arange(len(places)))
-    around = _tree(places[some]).query(places, min(PARTING.around, len(some)))[1]
-    return values[some][around.reshape(len(places), -1)].mean(1)
+    return (part | nearer)[tree.query(thing.places)[1]]
 
 
 def wall_faces(thing: Thing) -> Int[np.ndarray, " m"]:
@@ -60,17 +57,19 @@ def wall_faces(thing: Thing) -> Int[np.ndarray, " m"]:
             break
         starts, ends = ground[chance.choice(some, (2, PARTING.trials))]
         across = (ends - starts)[:, ::-1] * (1, -1)
-        across = across / np.maximum(np.linalg.norm(across, axis=1, keepdims=True), 1e-9)
+        lengths = np.linalg.norm(across, axis=1, keepdims=True)
+        across = across / np.where(lengths > 0, lengths, np.nan)  # on a line through one place lies nothing
         offsets = (across * starts).sum(1)
         best = int((abs(ground[some] @ across.T - offsets) <= slack[some, None]).sum(0).argmax())
         own = (numbers < 0) & (abs(ground @ across[best] - offsets[best]) <= slack)
         if own.mean() < PARTING.face:
             break
         numbers[own] = number
-    known = _some(np.flatnonzero(numbers >= 0))
+    known, left = _some(np.flatnonzero(numbers >= 0)), numbers < 0
     if not len(known):
         return np.zeros(len(ground), int)
-    return numbers[known][_tree(thing.places[known]).query(thing.places)[1]]
+    numbers[left] = numbers[known][_tree(thing.places[known]).query(thing.places[left])[1]]
+    return numbers
 
 
 def _some(rows: Int[np.ndarray, " m"]) -> Int[np.ndarray, " n"]:

@@ -9,6 +9,8 @@ import torch
 from langflash_core import pipeline
 from langflash_core.language.grammar import read_phrase
 from langflash_core.language.narrowing import Sight, choose, viewer_axes
+from langflash_core.language.parting import called_part, wall_faces
+from langflash_core.language.things import Thing
 from langflash_core.types import Scene
 from tests.boxroom import box_room
 
@@ -198,6 +200,34 @@ def test_of_a_thing_of_two_colours_the_part_is_meant(phrase: str, lower, upper, 
     rows = np.isin(np.arange(1600), np.concatenate([each.rows for each in kept] or [[]]))
     shares = {"lower": (1, 0), "upper": (0, 1), "both": (1, 1), "none": (0, 0)}[meant]
     assert (rows[:800].mean(), rows[800:].mean()) == pytest.approx(shares, abs=0.06)
+
+
+def test_of_a_large_thing_the_same_part_is_meant() -> None:
+    """Of more places than are looked at, up to a fiftieth of it."""
+    across, up = np.random.default_rng(0).random((2, 40_000))
+    thing = Thing(np.arange(len(up)), np.stack((across, up, np.full(len(up), 2.0)), 1))
+    part = called_part(thing, np.where((up < 0.5)[:, None], WOOD, PAINT), (up < 0.5).astype(float))
+    assert part is not None and (part != (up < 0.5)).mean() < 0.02
+
+
+@pytest.mark.parametrize("count", [12, 60, 3000])
+def test_walls_of_few_places_are_told_apart_too(count: int) -> None:
+    """A line through one place twice is none, on which all would lie."""
+    along = np.linspace(0.3, 3, count)
+    left, behind = np.stack((0 * along - 2, along)), np.stack((along - 2, 0 * along + 3.3))
+    right, away = np.concatenate((left, behind), 1)
+    numbers = wall_faces(Thing(np.arange(2 * count), np.stack((right, np.sin(40 * right), away), 1)))
+    assert len(set(numbers[:count])) == len(set(numbers[count:])) == 1 and numbers[0] != numbers[-1]
+
+
+def test_none_is_white_for_having_more_colour() -> None:
+    """Of two grey ladders, one of which has a tint, neither stands out; each has a white part."""
+    sight = two_ladders(0.35, 0.3)
+    lit = (sight.colours == (60.0, 30.0, 45.0)).all(1)
+    tint = np.where((np.arange(1220) < 200)[:, None], (60.0, 4.0, 4.0), (60.0, 0.0, 0.0))
+    colours = np.where(lit[:, None], (95.0, 0.0, 0.0), tint)
+    kept = choose(read_phrase("white ladder"), replace(sight, colours=colours)).kept
+    assert sorted(len(each.rows) for each in kept) == [70, 300]
 
 
 def test_people_are_told_that_a_colour_is_but_a_tint() -> None:
