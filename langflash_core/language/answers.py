@@ -46,8 +46,7 @@ def answer(
     # Without atoms nothing can be there, whatever the threshold.
     covered = (frame.alphas >= ANSWERING.covered_alpha) & (compiled.factor.shape[0] > 0)  # (H, W)
     scores = presence_scores(relevance, covered)
-    chosen = threshold is not None or compiled.mode == "cosine"
-    lit = [limit if chosen else ANSWERING.lit_from(score, limit) for score in scores.tolist()]
+    lit = lit_from(scores, compiled, threshold)
     masks = (relevance >= relevance.new_tensor(lit)[:, None, None]) & covered
     found = (scores >= limit) & (masks.flatten(1).float().mean(1) >= ANSWERING.min_area)
     masks = masks & found[:, None, None]
@@ -64,6 +63,13 @@ def answer(
         read = ("" if reading.whole else str(reading) for reading in compiled.readings)
         answers = tuple(replace(one, reading=text) for one, text in zip(answers, read, strict=True))
     return QueryResult(answers, compiled.mode, relevance, masks, frame, camera)
+
+
+def lit_from(scores: Float[Tensor, " P"], compiled: CompiledQuery, threshold: float | None) -> list[float]:
+    """The values from which pixels belong to phrases that score so; threshold: as of `answer`."""
+    if threshold is not None or compiled.mode == "cosine":
+        return [compiled.threshold if threshold is None else threshold] * len(scores)
+    return [ANSWERING.lit_from(score, compiled.threshold) for score in scores.tolist()]
 
 
 def presence_scores(relevance: Float[Tensor, "P H W"], covered: Bool[Tensor, "H W"]) -> Float[Tensor, " P"]:

@@ -5,12 +5,13 @@ import itertools
 import json
 import math
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 import torch
 from jaxtyping import Float
+from torch import Tensor
 
 from langflash_core import pipeline
 from langflash_core.base.colormaps import HeatColours
@@ -35,12 +36,14 @@ from langflash_core.geometry.poses import (
 from langflash_core.geometry.reach import median_reach
 from langflash_core.geometry.rotations import turn_of
 from langflash_core.geometry.tours import RATE, along, even
+from langflash_core.language.answers import lit_from, presence_scores
 from langflash_core.language.relevance import CompiledQuery
+from langflash_core.language.settings import ANSWERING
 from langflash_core.language.spaces import language_space
 from langflash_core.language.spoken import compile_spoken
 from langflash_core.scene.exposure import lit_camera
 from langflash_core.scene.tour import read_tour
-from langflash_core.types import NO_LANGUAGE, Camera, Scene
+from langflash_core.types import NO_LANGUAGE, Camera, Frame, Scene
 from langflash_core.writing.cameras import camera_of
 from langflash_core.writing.encoding import open_encoder
 from langflash_core.writing.job import Job
@@ -77,14 +80,26 @@ def write_film(job: Job) -> str:
     return f"{len(cameras) / RATE:.1f} s, {cameras[0].width} x {cameras[0].height}"
 
 
-def compile_phrase(scene: Scene, phrase: str, threshold: float | None) -> CompiledQuery:
-    """What a heat-map is of: the head of a phrase (`language/grammar.py`).
+@dataclass(frozen=True)
+class Heat:
+    """What a heat-map is of. threshold: that somebody chose, or None."""
+
+    compiled: CompiledQuery
+    threshold: float | None
+
+    def lit_from(self, frame: Frame, relevance: Float[Tensor, "1 H W"]) -> float:
+        """The relevancy from which pixels of this picture belong to its answer."""
+        scores = presence_scores(relevance, frame.alphas >= ANSWERING.covered_alpha)
+        return lit_from(scores, self.compiled, self.threshold)[0]
+
+
+def compile_phrase(scene: Scene, phrase: str, threshold: float | None) -> Heat:
+    """Of the head of a phrase (`language/grammar.py`).
 
     Raises:
         PromptError: the phrase cannot be used.
     """
-    compiled = compile_spoken(scene, language_space(scene.semantics.space), [phrase])
-    return compiled if threshold is None else replace(compiled, threshold=threshold)
+    return Heat(compile_spoken(scene, language_space(scene.semantics.space), [phrase]), threshold)
 
 
 def way(
@@ -140,7 +155,7 @@ def write(
     cameras: list[Camera],
     renderer: Renderer,
     progress: Progress,
-    heat: CompiledQuery | None = None,
+    heat: Heat | None = None,
     colours: HeatColours = USUAL,
 ) -> None:
     """Draw every camera into an H.264 file, or an animated WebP that begins again at its end.
@@ -162,15 +177,16 @@ def picture(
     scene: Scene,
     camera: Camera,
     renderer: Renderer,
-    heat: CompiledQuery | None,
+    heat: Heat | None,
     colours: HeatColours = USUAL,
 ) -> np.ndarray:
     """(H, W, 3) uint8, in the light of the place."""
     camera = lit_camera(scene, camera)
     if heat is None:
         return renderer.colours(scene, camera)
-    frame, relevance = renderer.answered(scene, camera, heat)
-    return to_8bit(heat_over(relevance[0], frame.rgb, heat.threshold, heat.mode, colours))
+    frame, relevance = renderer.answered(scene, camera, heat.compiled)
+    lit = heat_over(relevance[0], frame.rgb, heat.lit_from(frame, relevance), heat.compiled.mode, colours)
+    return to_8bit(lit)
 
 
 def _poses(scene: Scene) -> list[Pose]:

@@ -9,8 +9,9 @@ import torch
 from PIL import Image
 
 from app.cli.renderers import GlRenderer
+from langflash_core import pipeline
 from langflash_core.errors import ViewError
-from langflash_core.export.png import to_8bit
+from langflash_core.export.png import heat_over, to_8bit
 from langflash_core.geometry.cameras import rotation_angle_degrees
 from langflash_core.writing import films as video
 from langflash_core.writing.renderers import TorchRenderer
@@ -130,6 +131,17 @@ def test_a_heat_map_film_glows_where_the_phrase_is(backend):
     assert plain[:, :15].mean() < 1.2 * plain[:, 30:].mean()
     if isinstance(renderer, GlRenderer):
         renderer.release()
+
+
+@pytest.mark.parametrize("threshold", [None, 0.6])
+def test_a_film_is_lit_from_where_the_mask_is(threshold):
+    scene = stripes()
+    heat = video.compile_phrase(scene, "armchair", threshold)
+    found = pipeline.query(scene, "armchair", threshold=threshold)
+    assert heat.lit_from(found.frame, found.relevance) == found.answers[0].lit_from
+    lit = heat_over(found.relevance[0], found.frame.rgb, found.answers[0].lit_from, found.mode)
+    picture = video.picture(scene, scene.camera(0), TorchRenderer(), heat)
+    np.testing.assert_array_equal(picture, to_8bit(lit))
 
 
 def test_gl_reads_the_colours_that_the_frame_has():
