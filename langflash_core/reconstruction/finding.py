@@ -48,12 +48,11 @@ def predictor(options: Options, tools: Tools, ahead: Ahead, run: Run) -> Callabl
 def with_help(predict: Callable[[], Prediction], network: nn.Module) -> Prediction:
     """What `predict` finds; where the network's device cannot do something, on the processor. There the
     network then stays: scenes after this one are not told again."""
-    try:
+    with suppress(RuntimeError, TypeError):  # no such operation, kind of number or memory
         return predict()
-    except (RuntimeError, TypeError):  # no such operation, kind of number or memory
-        network.to("cpu")
-        found = predict()
-        return replace(found, warnings=(*found.warnings, _HELPED))
+    network.to("cpu")  # after the error is gone, which holds what filled the card
+    found = predict()
+    return replace(found, warnings=(*found.warnings, _HELPED))
 
 
 def keep_of(folder: Path, views: Views, settings: tuple, found: list[str] | None = None) -> Keep:
