@@ -41,7 +41,8 @@ def segment(
 
     A phrase is found where some photo shows what answers it with `ANSWERING.min_area` of its pixels.
     Connected things that no photo shows so large are no things, be they small or hidden behind others; but
-    the one that is shown best always is. Of what is not found, nothing is a member.
+    the one that is shown best always is. Of what is not found, nothing is a member. Of a thing those are that
+    a mask has (`language/answers.py`), by the thing's own score: a less sure door stays whole.
 
     Args:
         scene: or the path of one. prompts: phrases, or one.
@@ -55,12 +56,18 @@ def segment(
     limit = compiled.threshold if threshold is None else threshold
     check_threshold(limit)
     relevance, _ = meant_relevance(scene, compiled, [limit] * len(prompts))  # (P, N)
-    members = ((relevance >= limit) & (scene.semantics.num_atoms > 0)).cpu()
-    shares = photo_shares(scene)  # (V, N)
+    relevance, shares = relevance.cpu(), photo_shares(scene)  # (V, N)
+    mean = shares.mean(0)
+    scores = _scores(relevance, mean).tolist()
+    lit = [ANSWERING.lit_from(score, limit) if threshold is None else limit for score in scores]
+    members = (relevance >= torch.tensor(lit).clamp_max(limit)[:, None]) & (scene.semantics.num_atoms > 0)
     numbers = torch.stack([connected_things(scene, row, shares) for row in members])
+    if threshold is None:
+        for row, least in enumerate(lit):
+            members[row] &= relevance[row] >= _lit_from(numbers[row], relevance[row], mean, limit, least)
+            numbers[row] = _renumbered(numbers[row] * members[row])
     members &= (numbers > 0).any(1, keepdim=True)
-    scores = _scores(relevance.cpu(), shares.mean(0))
-    return Segments(compiled.texts, tuple(scores.tolist()), float(limit), members, numbers)
+    return Segments(compiled.texts, tuple(scores), float(limit), members, numbers)
 
 
 def photo_shares(scene: Scene) -> Tensor:
@@ -88,14 +95,35 @@ def connected_things(scene: Scene, members: Tensor, shares: Tensor) -> Tensor:
     return torch.where(kept, kept.cumsum(0), 0)[numbers]
 
 
+def _lit_from(numbers: Tensor, relevance: Tensor, shares: Tensor, limit: float, least: float) -> Tensor:
+    """(N,) relevancy from which Gaussians belong to the things so numbered, each by its own score; crumbs to
+    none, from `least` on."""
+    each, top = torch.full_like(relevance, least), float(ANSWERING.top_fraction * shares.sum())
+    counts = numbers.bincount().tolist()
+    for rows in numbers.argsort(stable=True).split(counts)[1:]:
+        (score,) = _best(relevance[None, rows], shares[rows], top).tolist()
+        each[rows] = ANSWERING.lit_from(score, limit)
+    return each
+
+
+def _renumbered(numbers: Tensor) -> Tensor:
+    """The same from 1 on without gaps, 0 stays."""
+    return torch.cat((numbers.new_zeros(1), numbers)).unique(return_inverse=True)[1][1:]
+
+
 def _scores(relevance: Tensor, shares: Tensor) -> Tensor:
     """(P,) mean relevancy of what answers best, as much as makes up `ANSWERING.top_fraction` of all shares
     (N,)."""
     if not float(shares.sum()) > 0:
         return relevance.new_zeros(len(relevance))
+    return _best(relevance, shares, float(ANSWERING.top_fraction * shares.sum()))
+
+
+def _best(relevance: Tensor, shares: Tensor, top: float) -> Tensor:
+    """(P,) means of what answers best, as much as makes up `top` of shares (n,), or all there is."""
     best, order = relevance.sort(dim=1, descending=True)
     own = shares[order]
-    left = ANSWERING.top_fraction * shares.sum() - (own.cumsum(1) - own)
+    left = top - (own.cumsum(1) - own)
     taken = torch.minimum(own, left.clamp_min(0))
     return (best * taken).sum(1) / taken.sum(1)
 

@@ -499,8 +499,8 @@ class QueryResult:
 class Segments:
     """What P phrases are made of, in 3D and so the same in every view.
 
-    scores (P,): mean relevancy of the thousandth of what the photos show that answers best. members (P, N)
-    bool: Gaussians of relevancy `threshold` and more; of a phrase that is not found, none. instances
+    scores (P,): mean relevancy of the thousandth of what the photos show that answers best; found from
+    `threshold` on. members (P, N) bool: Gaussians; of a phrase that is not found, none. instances
     (P, N) int64: which connected thing of the phrase each belongs to, from 1; 0 for others, for crumbs and
     for what no photo shows.
 

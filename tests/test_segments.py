@@ -189,6 +189,19 @@ def test_a_flat_thing_of_few_large_elements_is_found_beside_a_textured_one():
     assert parts.scores[0] > parts.threshold
 
 
+def test_a_thing_is_without_its_halo_and_a_less_sure_one_is_whole(monkeypatch):
+    """As a mask has them: beside a door of .98 the wall has .8, and another door has .9."""
+    near, apart = square(-0.3, 0, 1, 0.6, 0.02), square(0.4, 0, 1, 0.3, 0.02)
+    scene = sized(stripes(), ["armchair"], [(near, 0.014, 0), (apart, 0.014, 0)])
+    door = ((near[:, :2] - torch.tensor([-0.3, 0.0])).abs() < 0.15).all(1)
+    sure = torch.cat((torch.where(door, 0.98, 0.8), torch.full((len(apart),), 0.9)))
+    monkeypatch.setattr(segments, "meant_relevance", lambda *_: (sure[None], ("",)))
+    parts = segments.segment(scene, ["armchair"])
+    assert parts.threshold < 0.8 and parts.counts == (2,)
+    assert torch.equal(parts.members[0], sure > 0.8) and torch.equal(parts.instances[0] > 0, sure > 0.8)
+    assert segments.segment(scene, ["armchair"], threshold=0.79).members.all()
+
+
 def test_many_elements_smaller_than_a_pixel_are_not_more_than_they_show():
     """A hundred of them on a part of a pixel are noise."""
     wall = (square(0, 0, 1, 2.0, 0.02), 0.014, 0)
