@@ -9,6 +9,26 @@ def buffer_of(ctx: moderngl.Context, values: np.ndarray) -> moderngl.Buffer:
     return ctx.buffer(np.ascontiguousarray(values) if values.size else bytes(4))
 
 
+class Brought:
+    """A buffer of the array that was brought last, which is not brought again."""
+
+    def __init__(self, ctx: moderngl.Context):
+        self._buffer = Growing(ctx)
+        self._values: np.ndarray | None = None
+
+    def of(self, values: np.ndarray) -> moderngl.Buffer:
+        """The buffer, with what this array holds; whoever gives it changes nothing in it."""
+        buffer = self._buffer.at_least(values.nbytes)
+        if values is not self._values:
+            buffer.write(np.ascontiguousarray(values))
+            self._values = values
+        return buffer
+
+    def release(self) -> None:
+        self._buffer.release()
+        self._values = None
+
+
 class Growing:
     """A buffer made when first needed, and larger when more is."""
 

@@ -1,6 +1,6 @@
 """One scene's Gaussians on the GPU: sorted, projected, and their weights expanded, per camera."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, replace
 
 import moderngl
@@ -154,6 +154,10 @@ class SplatBuffers:
         return np.flatnonzero(self.carried.atoms_of(self.order, np.zeros(1, np.int64)))
 
     # --- by shaders that write buffers ------------------------------------------------------
+
+    def compile(self, camera: Camera) -> Iterator[None]:
+        """Ahead of `project`, where that is of many shaders: a shader a step."""
+        yield from ()
 
     def project(self, camera: Camera) -> None:
         """Footprints and colours of the chosen Gaussians into `places`, in draw order."""

@@ -56,6 +56,8 @@ def warm_layers(canvas: Canvas, splats: MakeSplats = SplatBuffers) -> Iterator[N
 def _ways(view: ViewTargets, scene: LiveScene) -> Iterator[None]:
     level, camera = scene.whole, _CAMERA
     yield
+    for part in level.parts:
+        yield from part.splats.compile(camera)
     level.prepare(camera)
     yield
     view.draw_colour(level)

@@ -37,6 +37,7 @@ if TYPE_CHECKING:
 
     from ..gl import SplatRenderer
     from ..gl.scene import Thinned
+    from ..gl.tiled.trial import Steps, Way
 
 log = logging.getLogger(__name__)
 
@@ -61,6 +62,7 @@ class Viewport:
         self._adjusting = False  # what is drawn changes with every frame
         self._fresh = False  # a scene has just been taken
         self._wanted, self._way = "measured", ""  # how splats are drawn: as preferred, and as they are
+        self._trial: Steps | None = None  # which says how, under way
         self._awaited: tuple[int, Scene, Governor] | None = None  # a large scene, whose share is to come
         self._around: Around | None = None  # where the share of a huge scene was chosen
         self._choosing = False  # it anew, on the worker's thread
@@ -83,14 +85,40 @@ class Viewport:
             self._choose(self._renderer)
 
     def _choose(self, renderer: "SplatRenderer") -> None:
-        from ..gl.tiled.trial import chosen, maker
+        from ..gl.tiled.trial import chosen, trying
 
         way = chosen(self._ctx, self._wanted)
+        self._end_trial()
+        if way is None:
+            self._trial = trying(self._ctx)
+        self._take(renderer, way or "quads")
+
+    def _take(self, renderer: "SplatRenderer", way: "Way") -> None:
+        from ..gl.tiled.trial import maker
+
         if way != self._way:
             self._way = way
             renderer.draw_with(maker(self._ctx, way))
             if self.picture is not None:
                 self.picture.easel.drawn = None
+
+    def _tried(self) -> bool:
+        """Go on with the trial by a step; whether there was one to do."""
+        trial, self._trial = self._trial, None
+        if trial is None:
+            return False
+        with self._said():
+            try:
+                next(trial)
+                self._trial = trial
+            except StopIteration as end:
+                self._take(self._made(), end.value)
+        return True
+
+    def _end_trial(self) -> None:
+        if self._trial is not None:
+            self._trial.close()
+        self._trial = None
 
     # --- what to show -----------------------------------------------------------------------
 
@@ -98,11 +126,13 @@ class Viewport:
         """Compile shaders while there is no scene, one a call at the most; whether there is more to do."""
         if self.picture is not None:
             return False
-        if self._warming is None:
-            with self._said():
-                from ..gl.warming import warm_up
+        with self._said():
+            from ..gl.warming import warm_up
 
-                renderer = self._made()
+            renderer = self._made()
+            if self._tried():
+                return True
+            if self._warming is None:
                 self._warming = warm_up(renderer.canvas, renderer.splats)
         return self._warmed()
 
@@ -264,7 +294,8 @@ class Viewport:
         wait = self.picture.update(state, self._stand, touched)
         if self._own is not None:
             self._forget_look()
-        return wait
+        resting = wait == float("inf")  # a trial between frames of a moving camera would hold them up
+        return 0.0 if resting and self._tried() else wait
 
     # --- what is shown ----------------------------------------------------------------------
 
@@ -356,6 +387,7 @@ class Viewport:
             self.picture.release(_PATIENCE)
         self.picture = self._warming = self._awaited = None
         self._forget_look()
+        self._end_trial()
         if self._renderer is not None:
             self._renderer.release()
         self._renderer = None

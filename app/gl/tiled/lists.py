@@ -1,7 +1,7 @@
 """Which Gaussians each tile of a picture may show, nearest first: projected, ordered and dealt out by compute
 shaders. Of an order nothing crosses the bus but its length."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 
 import moderngl
 import numpy as np
@@ -10,7 +10,7 @@ from langflash_core.base.graphics import Programs, set_uniforms
 from langflash_core.splat.projection import NEAR
 from langflash_core.types import Camera
 
-from ..buffers import Growing
+from ..buffers import Brought, Growing
 from ..ordering import matrices
 from ..vertices import Vertices
 
@@ -25,6 +25,8 @@ _DIGIT = 4  # bits of a key, sorted at once: counters of a group fill 16 KB, hal
 _HIGH_BITS = 28  # of a depth key's upper word: eleven of the exponent, less what no depth has, and mantissa
 _SLACK = 0.02  # deviations, of quad.vert
 _DEFINES = {"GROUP": GROUP, "EACH": _EACH, "DIGITS": 1 << _DIGIT, "TILE": TILE}
+_PROJECTING = {"SLACK": _SLACK, "HIDDEN": HIDDEN}
+_SUMMING = {"GROUP": _SCANNING}
 _SPLAT = 64  # bytes: footprint, place, colour, tiles and key
 _KEY_BASE = 0x3F800000 << 32  # of project.comp
 
@@ -46,7 +48,8 @@ class TileLists:
         self._programs = programs
         self._vertices = vertices
         self._count = count
-        self._made = {name: Growing(ctx) for name in ("splats", "ranges", "counts", "totals", "atoms")}
+        self._made = {name: Growing(ctx) for name in ("splats", "ranges", "counts", "totals")}
+        self._atoms = Brought(ctx)
         self._elements = [Growing(ctx), Growing(ctx)]  # keys and rows, by turns
         self._pairs = [Growing(ctx), Growing(ctx)]
         self._bytes = max(_SPLAT, vertices.most_bytes, beside)
@@ -81,6 +84,19 @@ class TileLists:
 
     # --- the steps ----------------------------------------------------------------------------
 
+    def compile(self, defines: Mapping[str, float]) -> Iterator[None]:
+        """All of them ahead, a shader a step. defines: of project.glsl."""
+        for name in ("key", "digits", "move", "touched", "pair", "ranges", "atoms"):
+            self._shader(name)
+            yield
+        self._shader("project", {**defines, **_PROJECTING})
+        yield
+        self._shader("scan", _SUMMING)
+        yield
+
+    def _shader(self, name: str, defines: Mapping[str, float] | None = None) -> moderngl.ComputeShader:
+        return self._programs.compute(f"tiled/{name}.comp", {**_DEFINES, **(defines or {})})
+
     def _project(self, camera: Camera, defines: Mapping, uniforms: Mapping) -> tuple[int, int, int]:
         """Gaussians in view, and the two words of their pairs' number."""
         totals = self._buffer("totals", 12)
@@ -93,7 +109,7 @@ class TileLists:
             bound,
             {**uniforms, "count": self._count, "grid": self.grid, "depth_row": tuple(viewmat[2].tolist())}
             | {"nearest": NEAR},
-            {**defines, "SLACK": _SLACK, "HIDDEN": HIDDEN},
+            {**defines, **_PROJECTING},
         )
         seen, low, high = np.frombuffer(totals.read(12), np.uint32).tolist()
         return seen, low, high
@@ -137,7 +153,7 @@ class TileLists:
             elements.reverse()
 
     def _scan(self, num_counts: int) -> None:
-        self._run("scan", 1, (self._buffer("counts"),), {"count": num_counts}, {"GROUP": _SCANNING})
+        self._run("scan", 1, (self._buffer("counts"),), {"count": num_counts}, _SUMMING)
 
     @staticmethod
     def _blocks(count: int) -> int:
@@ -151,7 +167,7 @@ class TileLists:
         uniforms: Mapping,
         defines: Mapping[str, float] | None = None,
     ) -> None:
-        shader = self._programs.compute(f"tiled/{name}.comp", {**_DEFINES, **(defines or {})})
+        shader = self._shader(name, defines)
         set_uniforms(shader, **uniforms)
         for place, buffer in enumerate(bound):
             buffer.bind_to_storage_buffer(place)
@@ -185,8 +201,7 @@ class TileLists:
 
     def atoms(self, bits: np.ndarray) -> np.ndarray:
         """(words,) uint32, bits of the atoms in view; bits: (N, words) uint32, of those that each carries."""
-        carried = self._made["atoms"].at_least(bits.nbytes)
-        carried.write(np.ascontiguousarray(bits))
+        carried = self._atoms.of(bits)
         seen = self._ctx.buffer(np.zeros(bits.shape[1], np.uint32))
         given = {"count": self._count, "words": bits.shape[1]}
         self._run("atoms", -(-self._count // GROUP), (self._buffer("splats"), carried, seen), given)
@@ -196,6 +211,6 @@ class TileLists:
 
     def release(self) -> None:
         """Give every buffer back; what is found next makes them anew."""
-        for owned in (*self._made.values(), *self._elements, *self._pairs):
+        for owned in (self._atoms, *self._made.values(), *self._elements, *self._pairs):
             owned.release()
         self.num_seen = self.num_pairs = 0

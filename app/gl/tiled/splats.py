@@ -1,5 +1,6 @@
 """One scene's Gaussians drawn tile by tile: the pictures of `SplatBuffers`, by compute shaders."""
 
+from collections.abc import Iterator
 from functools import cached_property
 
 import moderngl
@@ -8,6 +9,7 @@ import numpy as np
 from langflash_core.base.graphics import Programs, set_uniforms
 from langflash_core.types import Camera, Scene
 
+from ..buffers import Brought
 from ..carried import bytes_of
 from ..layout import ATOMS_A_LAYER, LAYERS_A_PASS
 from ..ordering import FEW
@@ -34,6 +36,7 @@ class TiledSplats(SplatBuffers):
         super().__init__(ctx, programs, scene, shapes)
         beside = max(bytes_of(LAYERS_A_PASS), 8 * self.carried.bits.shape[1])
         self._lists = TileLists(ctx, programs, self._vertices, self.num_gaussians, beside)
+        self._own_numbers = Brought(ctx)  # row by row
         self._exact = True  # what is drawn next, or was last
         self._tiled = True
 
@@ -84,6 +87,9 @@ class TiledSplats(SplatBuffers):
     def _atom_words(self) -> np.ndarray:
         return self.carried.bits.astype("<u8").view("<u4")
 
+    def compile(self, camera: Camera) -> Iterator[None]:
+        yield from self._lists.compile(self._projection(camera)[0])
+
     def project(self, camera: Camera) -> None:
         """Footprints, colours, order and lists of tiles, on the card."""
         self.shapes.forget()
@@ -106,8 +112,7 @@ class TiledSplats(SplatBuffers):
         carried, num_layers = None, 0
         if numbers is not None and self.num_chosen:
             num_layers = numbers.shape[1] // ATOMS_A_LAYER
-            carried = self._numbers.at_least(numbers.nbytes)
-            carried.write(np.ascontiguousarray(numbers))
+            carried = self._own_numbers.of(numbers)
         self._fill(into, {"COLOUR": 1} if depth else {"COLOUR": 1, "ALONE": 1}, carried, num_layers)
 
     def splat_weights(
@@ -142,7 +147,9 @@ class TiledSplats(SplatBuffers):
             weights.bind_to_storage_buffer(3)
         with drawing(into):
             self._vaos[key].render(moderngl.TRIANGLES, vertices=3)
+        self._ctx.memory_barrier()  # what comes next writes where these fragments read
 
     def release(self) -> None:
         self._lists.release()
+        self._own_numbers.release()
         super().release()

@@ -5,6 +5,7 @@ import json
 import math
 import statistics
 import time
+from collections.abc import Callable, Generator
 from contextlib import suppress
 from dataclasses import asdict, dataclass
 from functools import partial
@@ -24,6 +25,7 @@ from ...places import config_folder
 from ..processor.moving import REACH
 from ..renderer import SplatRenderer
 from ..splats import MakeSplats, SplatBuffers
+from ..warming import warm_up
 from .splats import TiledSplats
 
 Way = Literal["quads", "tiles"]
@@ -35,6 +37,9 @@ SAME = 0.01
 """Of full brightness, on average, that both pictures may differ by: float16 quads lose up to a third of that
 under forty layers, what is wrong shows more."""
 _GAUSSIANS, _ATOMS, _SIZE, _FRAMES = 150_000, 24, (1280, 720), 3
+
+Steps = Generator[None, None, "Way"]
+"""A trial, to be gone on with between frames; each step takes about as long as one."""
 
 
 @dataclass(frozen=True)
@@ -50,14 +55,19 @@ class Trial:
         return "tiles" if self.tiles_ms < CLEARLY * self.quads_ms else "quads"
 
 
-def chosen(ctx: moderngl.Context, wanted: str) -> Way:
-    """How to draw on a context. wanted: "quads", "tiles", or "measured". Where OpenGL runs on the processor,
-    which draws tiles several times as slowly (MEASURED.md), nothing is tried."""
+FATAL = Trial(0.0, math.inf)
+"""Kept while a trial is under way: of a driver that takes the process along the next start tries nothing."""
+
+
+def chosen(ctx: moderngl.Context, wanted: str) -> Way | None:
+    """How to draw on a context; None: a trial must say it. wanted: "quads", "tiles", or "measured". Where
+    OpenGL runs on the processor, which draws tiles several times as slowly, nothing is tried."""
     if wanted == "quads" or ctx.version_code < COMPUTE:
         return "quads"
     if wanted == "tiles":
         return "tiles"
-    return "quads" if draws_in_software(ctx) else tried(ctx).sooner
+    found = FATAL if draws_in_software(ctx) else kept(ctx)
+    return None if found is None else found.sooner
 
 
 def maker(ctx: moderngl.Context, way: Way) -> MakeSplats:
@@ -71,58 +81,86 @@ def file() -> Path:
     return config_folder() / "drawing.json"
 
 
-def tried(ctx: moderngl.Context) -> Trial:
-    """The trial of this card and driver: the one that is kept, or else a new one."""
-    driver = f"{ctx.info['GL_RENDERER']}, {ctx.info['GL_VERSION']}"
-    kept = _kept()
-    with suppress(KeyError, TypeError, ValueError):
-        return Trial(**{name: float(ms) for name, ms in kept[driver].items()})
-    trial = measured(ctx)
+def kept(ctx: moderngl.Context) -> Trial | None:
+    """The trial of this card and driver, if there was one."""
+    with suppress(KeyError, TypeError, ValueError, AttributeError, OverflowError):
+        return Trial(**{name: float(ms) for name, ms in _all_kept()[_driver(ctx)].items()})
+    return None
+
+
+def trying(ctx: moderngl.Context) -> Steps:
+    """Make the trial of this card and driver, and keep what it says; one that is ended early never was."""
+    found = None
+    _keep(ctx, FATAL)
+    try:
+        found = yield from measuring(ctx)
+        return found.sooner
+    finally:
+        _keep(ctx, found)
+
+
+def _driver(ctx: moderngl.Context) -> str:
+    return f"{ctx.info['GL_RENDERER']}, {ctx.info['GL_VERSION']}"
+
+
+def _keep(ctx: moderngl.Context, trial: Trial | None) -> None:
+    others = {driver: told for driver, told in _all_kept().items() if driver != _driver(ctx)}
+    own = {} if trial is None else {_driver(ctx): asdict(trial)}
     with suppress(OutputError):  # the next start tries again
         make_folder(file().parent)
-        write_atomically(file(), json.dumps({**kept, driver: asdict(trial)}, indent=2).encode())
-    return trial
+        write_atomically(file(), json.dumps({**others, **own}, indent=2).encode())
 
 
-def _kept() -> dict:
-    with suppress(OSError, ValueError):
-        kept = json.loads(file().read_bytes())
-        if isinstance(kept, dict):
-            return kept
+def _all_kept() -> dict:
+    with suppress(OSError, ValueError, RecursionError):
+        content = json.loads(file().read_bytes())
+        if isinstance(content, dict):
+            return content
     return {}
 
 
-def measured(ctx: moderngl.Context) -> Trial:
+def measuring(ctx: moderngl.Context) -> Generator[None, None, Trial]:
     """Draw some frames in both ways."""
     scene, cameras = _cloud(), [_camera(0.02 * frame) for frame in range(_FRAMES + 1)]
-    quads_ms, expected = _timed(ctx, SplatBuffers, scene, cameras)
-    tiles_ms, picture = _timed(ctx, TiledSplats, scene, cameras)
+    yield
+    quads_ms, expected = yield from _timed(ctx, SplatBuffers, scene, cameras)
+    yield
+    _ = ctx.error  # of the quads, or of the window before
+    tiles_ms, picture = yield from _timed(ctx, TiledSplats, scene, cameras)
     same = (picture - expected).abs().mean() <= SAME and ctx.error == "GL_NO_ERROR"
     return Trial(quads_ms, tiles_ms if same else math.inf)
 
 
 def _timed(
     ctx: moderngl.Context, make: MakeSplats, scene: Scene, cameras: list[Camera]
-) -> tuple[float, Tensor]:
+) -> Generator[None, None, tuple[float, Tensor]]:
     """Milliseconds, and the last picture (H, W, 3); infinite, and nothing to see, where the driver refuses.
-    The first frame compiles."""
+    The first frame compiles what `warm_up` did not."""
     renderer = SplatRenderer(ctx, splats=make)
     try:
+        yield from warm_up(renderer.canvas, make)
         renderer.set_scene(scene)
+        yield
         taken = []
         for camera in cameras:
-            renderer.finish()
-            start = time.perf_counter()
-            renderer.draw(camera, weight_maps=False, moving=True, late=True)
-            renderer.finish()
-            renderer.draw(camera)
-            renderer.finish()
-            taken.append(1e3 * (time.perf_counter() - start))
+            moving = partial(renderer.draw, camera, weight_maps=False, moving=True, late=True)
+            taken.append(_milliseconds(renderer, moving))
+            yield
+            taken[-1] += _milliseconds(renderer, partial(renderer.draw, camera))
+            yield
         return statistics.median(taken[1:]), renderer.frame().rgb
     except (GraphicsError, moderngl.Error):
         return math.inf, torch.zeros(())
     finally:
         renderer.release()
+
+
+def _milliseconds(renderer: SplatRenderer, draw: Callable[[], None]) -> float:
+    renderer.finish()
+    start = time.perf_counter()
+    draw()
+    renderer.finish()
+    return 1e3 * (time.perf_counter() - start)
 
 
 def _camera(yaw: float) -> Camera:

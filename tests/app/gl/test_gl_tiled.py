@@ -3,6 +3,7 @@ The hard cases and the ordinary ones are in test_gl_hard_cases.py and test_gl_ag
 
 from dataclasses import replace
 
+import moderngl
 import numpy as np
 import pytest
 import torch
@@ -11,6 +12,7 @@ from app.gl import SplatRenderer
 from app.gl.painter import Painter
 from app.gl.splats import SplatBuffers
 from app.gl.tiled import lists
+from app.gl.tiled.lists import TileLists
 from app.gl.tiled.splats import TiledSplats
 from langflash_core.base.graphics import COMPUTE
 from langflash_core.scene.changes import Recoloured
@@ -207,6 +209,45 @@ def test_another_way_to_draw_keeps_marks_and_the_picture_on_show(show):
     after = renderer.frame()
     assert not torch.equal(after.rgb, before.rgb), "drawn anew"
     within("colours", largest(after.rgb, before.rgb), BOTH)
+
+
+def test_a_moving_camera_brings_no_gaussian_to_the_card(show, monkeypatch):
+    """Neither what they carry for a phrase, nor the atoms of each."""
+    scene = cloud(4000, 8, dtype=torch.float32)
+    renderer = show(scene, "float32", splats=TiledSplats, asked=question(scene))
+    brought = []
+    write = moderngl.Buffer.write
+    monkeypatch.setattr(
+        moderngl.Buffer,
+        "write",
+        lambda self, data, **how: (brought.append(len(data)), write(self, data, **how)),
+    )
+    for turn, most in ((0.0, 4000 * 12), (0.1, 0), (0.2, 0)):
+        for fast in (True, False):
+            renderer.draw(camera(pose=turned(turn, (0.0, 0.0, 0.0))), fast=fast)
+        assert max(brought, default=0) <= most and (brought or not most)
+        brought.clear()
+
+
+def test_nothing_is_written_to_while_fragments_read_it(show, monkeypatch):
+    """What writes buffers in shaders waits for nothing of itself: a barrier stands before it."""
+    done = []
+
+    def told(kind: type, name: str, what: str) -> None:
+        own = getattr(kind, name)
+        monkeypatch.setattr(kind, name, lambda *a, **k: (own(*a, **k), done.append(what))[0])
+
+    told(moderngl.Context, "memory_barrier", "barrier")
+    told(moderngl.ComputeShader, "run", "write")
+    told(moderngl.VertexArray, "transform", "write")
+    told(TileLists, "bind", "read")
+    scene = cloud(300, 40, dtype=torch.float32)
+    renderer = show(scene, splats=TiledSplats)
+    for turn in (0.0, 0.1):
+        renderer.draw(camera(pose=turned(turn, (0.0, 0.0, 0.0))))
+    assert done.count("read") >= 6, "of two pictures the colours, and two passes of weights"
+    reads = [place for place, what in enumerate(done) if what == "read"]
+    assert all(done[place + 1 : place + 2] == ["barrier"] for place in reads)
 
 
 def test_a_scene_without_gaussians_is_empty(show):

@@ -2,15 +2,17 @@
 
 import json
 import math
-from typing import ClassVar
+from collections.abc import Generator
+from typing import Any, ClassVar
 
 import moderngl
 import pytest
+import torch
 
 from app.gl.splats import SplatBuffers
 from app.gl.tiled import trial
 from app.gl.tiled.splats import TiledSplats
-from app.gl.tiled.trial import Trial, chosen, file, measured, tried
+from app.gl.tiled.trial import Trial, chosen, file, kept, measuring, trying
 from langflash_core.base.graphics import COMPUTE, draws_in_software
 
 
@@ -19,6 +21,22 @@ class Card:
 
     version_code = COMPUTE
     info: ClassVar = {"GL_RENDERER": "A card", "GL_VERSION": "4.6 of a driver"}
+
+
+CARD: Any = Card()
+
+
+def ended(steps: Generator[None, None, Any]) -> Any:
+    """What a generator returns."""
+    try:
+        while True:
+            next(steps)
+    except StopIteration as end:
+        return end.value
+
+
+def measured(gl) -> Trial:
+    return ended(measuring(gl))
 
 
 @pytest.fixture(autouse=True)
@@ -32,7 +50,12 @@ def says(monkeypatch):
     made: list[Trial] = []
 
     def told(found: Trial) -> list[Trial]:
-        monkeypatch.setattr(trial, "measured", lambda ctx: made.append(found) or found)
+        def measuring(_ctx):
+            yield
+            made.append(found)
+            return found
+
+        monkeypatch.setattr(trial, "measuring", measuring)
         return made
 
     return told
@@ -50,37 +73,55 @@ def says(monkeypatch):
 )
 def test_a_card_draws_the_way_that_is_clearly_quicker(says, quads, tiles, way):
     says(Trial(quads, tiles))
-    assert chosen(Card(), "measured") == way  # pyright: ignore[reportArgumentType]
-    assert chosen(Card(), "quads") == "quads"  # pyright: ignore[reportArgumentType]
-    assert chosen(Card(), "tiles") == "tiles"  # pyright: ignore[reportArgumentType]
+    assert chosen(CARD, "measured") is None
+    assert ended(trying(CARD)) == way == chosen(CARD, "measured")
+    assert chosen(CARD, "quads") == "quads"
+    assert chosen(CARD, "tiles") == "tiles"
 
 
-def test_a_card_is_tried_once_and_another_driver_anew(says, monkeypatch):
-    made = says(Trial(10.0, 5.0))
-    for _ in range(2):
-        assert tried(Card()) == Trial(10.0, 5.0)  # pyright: ignore[reportArgumentType]
-    assert len(made) == 1
+def test_what_a_trial_said_is_kept_and_another_driver_tried_anew(says, monkeypatch):
+    says(Trial(10.0, 5.0))
+    assert ended(trying(CARD)) == "tiles" and kept(CARD) == Trial(10.0, 5.0)
     says(Trial(3.0, math.inf))
     monkeypatch.setattr(Card, "info", {**Card.info, "GL_VERSION": "4.6 of its successor"})
-    for _ in range(2):
-        assert tried(Card()) == Trial(3.0, math.inf)  # pyright: ignore[reportArgumentType]
-    assert len(made) == 2 and len(json.loads(file().read_bytes())) == 2
+    assert chosen(CARD, "measured") is None
+    assert ended(trying(CARD)) == "quads" and kept(CARD) == Trial(3.0, math.inf)
+    assert len(json.loads(file().read_bytes())) == 2
 
 
-@pytest.mark.parametrize("content", ["", "[]", '{"A card, 4.6 of a driver": {"quads_ms": 1}}', "{"])
+def test_a_trial_that_was_left_is_made_anew_and_one_that_took_the_process_along_is_not(says):
+    says(Trial(10.0, 5.0))
+    steps = trying(CARD)
+    next(steps)
+    assert chosen(CARD, "measured") == "quads", "what the next start finds, should the driver crash now"
+    steps.close()
+    assert chosen(CARD, "measured") is None
+
+
+OWN = '{"A card, 4.6 of a driver": %s}'
+HUGE = f'{{"quads_ms": 1{"0" * 400}, "tiles_ms": 1}}'
+
+
+@pytest.mark.parametrize(
+    "content",
+    [
+        *("", "[]", "{", "[" * 100_000),
+        *(OWN % own for own in ('{"quads_ms": 1}', "[1, 2]", "7", HUGE)),
+    ],
+    ids=lambda content: content[:50],
+)
 def test_what_is_damaged_is_tried_anew(says, content):
-    made = says(Trial(10.0, 5.0))
+    says(Trial(10.0, 5.0))
     file().parent.mkdir()
     file().write_text(content)
-    for _ in range(2):
-        assert tried(Card()) == Trial(10.0, 5.0)  # pyright: ignore[reportArgumentType]
-    assert len(made) == 1
+    assert chosen(CARD, "measured") is None
+    assert ended(trying(CARD)) == "tiles" == chosen(CARD, "measured")
 
 
 def test_a_folder_that_cannot_be_written_stops_nothing(says):
     says(Trial(10.0, 5.0))
     file().parent.parent.joinpath("new").write_text("a file")
-    assert chosen(Card(), "measured") == "tiles"  # pyright: ignore[reportArgumentType]
+    assert ended(trying(CARD)) == "tiles"
 
 
 def test_older_opengl_and_processors_keep_their_quads(gl, says, monkeypatch):
@@ -90,8 +131,8 @@ def test_older_opengl_and_processors_keep_their_quads(gl, says, monkeypatch):
             gl.version_code >= COMPUTE
         )
     monkeypatch.setattr(Card, "version_code", COMPUTE - 10)
-    for wanted in trial.WAYS:
-        assert chosen(Card(), wanted) == "quads"  # pyright: ignore[reportArgumentType]
+    for wanted in ("measured", "quads", "tiles"):
+        assert chosen(CARD, wanted) == "quads"
     assert not made and not file().exists()
 
 
@@ -107,6 +148,19 @@ def small(gl, monkeypatch):
 def test_both_ways_are_drawn_and_timed(gl):
     found = measured(gl)
     assert 0 < found.quads_ms < math.inf and 0 < found.tiles_ms < math.inf
+
+
+def test_what_went_wrong_before_is_not_the_tiles(monkeypatch):
+    class Flagged:
+        error = property(lambda _: flags.pop() if flags else "GL_NO_ERROR")
+
+    def timed(*_):
+        yield
+        return 1.0, torch.ones(3)
+
+    flags = ["GL_INVALID_ENUM"]
+    monkeypatch.setattr(trial, "_timed", timed)
+    assert measured(Flagged()).tiles_ms == 1.0
 
 
 class Refused(TiledSplats):

@@ -11,6 +11,7 @@ import torch
 from app.gl.layered import LayeredLevel
 from app.gl.processor import still
 from app.gl.scene import Thinned
+from app.gl.tiled import trial
 from app.gl.tiled.splats import TiledSplats
 from app.gl.tiled.trial import Trial
 from app.window.asking.commands import Answered, Narrowed
@@ -27,6 +28,7 @@ from app.window.scene.work import ThinAround
 from app.window.state import State
 from app.window.viewport import Viewport
 from langflash_core.base import pictures
+from langflash_core.base.graphics import COMPUTE
 from langflash_core.geometry.nearness import NEAREST
 from langflash_core.geometry.poses import Vector, from_view, orbit
 from langflash_core.language.relevance import compile_query
@@ -138,7 +140,7 @@ def test_another_way_to_draw_is_taken_at_once(viewport, monkeypatch) -> None:
     """As on a card whose trial said quads."""
     for module in ("window.viewport", "gl.tiled.trial"):
         monkeypatch.setattr(f"app.{module}.draws_in_software", lambda ctx: False)
-    monkeypatch.setattr("app.gl.tiled.trial.tried", lambda ctx: Trial(1.0, 2.0))
+    monkeypatch.setattr("app.gl.tiled.trial.kept", lambda ctx: Trial(1.0, 2.0))
     scene = spoken_room()
     state = showing(scene).with_asking(prompts=())
     viewport.set_scene(1, scene)
@@ -158,6 +160,58 @@ def test_another_way_to_draw_is_taken_at_once(viewport, monkeypatch) -> None:
     assert np.array_equal(quads, again) and quads.max() > 100
     # A few layers of float16 lose 2^-10 each as quads, which is a step of the screen's at the most.
     assert 0 < np.abs(tiles - quads).max() <= 3
+
+
+@pytest.fixture
+def on_trial(context, monkeypatch, tmp_path) -> list[str]:
+    """As on a card that was never tried; what its trial of three steps does, which says tiles."""
+    if context.version_code < COMPUTE:
+        pytest.skip("OpenGL 4.3 is not here")
+    steps: list[str] = []
+
+    def measuring(_ctx):
+        try:
+            for _ in range(3):
+                steps.append("step")
+                yield
+        finally:
+            steps.append("end")
+        return Trial(2.0, 1.0)
+
+    monkeypatch.setenv("LANGFLASH_CONFIG", str(tmp_path))
+    monkeypatch.setattr(trial, "measuring", measuring)
+    for module in ("window.viewport", "gl.tiled.trial"):
+        monkeypatch.setattr(f"app.{module}.draws_in_software", lambda ctx: False)
+    return steps
+
+
+def test_a_trial_takes_a_step_a_frame_before_there_is_a_scene(viewport, on_trial) -> None:
+    assert viewport.warm() and on_trial == ["step"], "no frame waits for the whole trial"
+    assert viewport.stats(card="A card").renderer == "A card, quads"
+    for _ in range(3):
+        viewport.warm()
+    assert on_trial == ["step"] * 3 + ["end"]
+    assert viewport.stats(card="A card").renderer == "A card, tiles"
+
+
+def test_a_trial_goes_on_when_the_picture_rests(viewport, on_trial) -> None:
+    scene = spoken_room()
+    viewport.set_scene(1, scene)
+    ways = []
+    for _ in living(viewport, showing(scene).with_asking(prompts=()), turns=10, count=100):
+        ways.append(viewport.stats(card="A card").renderer)
+        if len(ways) == 10:
+            assert not on_trial and viewport.texture is not None, "while a hand moves nothing is tried"
+        if "end" in on_trial and viewport.whole:
+            break
+    assert ways[-1] == "A card, tiles" and on_trial == ["step"] * 3 + ["end"]
+
+
+def test_a_window_that_is_closed_during_a_trial_makes_it_anew(viewport, on_trial) -> None:
+    viewport.warm()
+    viewport.release()
+    assert on_trial == ["step", "end"]
+    assert viewport.warm() and on_trial == ["step", "end", "step"]
 
 
 def test_pictures_that_move_and_that_rest_are_in_the_light_of_their_place(viewport) -> None:
