@@ -66,7 +66,9 @@ def chosen(ctx: moderngl.Context, wanted: str) -> Way | None:
         return "quads"
     if wanted == "tiles":
         return "tiles"
-    found = FATAL if draws_in_software(ctx) else kept(ctx)
+    if draws_in_software(ctx):
+        return "quads"
+    found = kept(ctx)
     return None if found is None else found.sooner
 
 

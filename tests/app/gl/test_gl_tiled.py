@@ -113,6 +113,17 @@ def test_what_there_is_no_room_for_is_drawn_as_quads(pair, monkeypatch, full):
     assert not torch.equal(tiles.frame(True).rgb, frames[0].rgb), "tiles again, where there is room"
 
 
+def test_lists_take_what_is_told(gl):
+    """In app/cli/drawn.py."""
+    tiled = tiles_of(gl, cloud(3000, dtype=torch.float32))
+    tiled.project(camera())
+    found = tiled._lists
+    assert sum(each.at_least(1).size for each in found._pairs) == 16 * found.num_pairs > 0
+    listed = (found._made["splats"], *found._elements)
+    assert sum(each.at_least(1).size for each in listed) == 80 * tiled.num_gaussians
+    tiled.release()
+
+
 @pytest.mark.parametrize("num_atoms", [0, 2000])
 def test_buffers_are_no_larger_than_the_driver_lets_shaders_see(gl, num_atoms):
     """What a pass of weights takes, or the bits of many atoms; beyond that a shader reads zeros."""
