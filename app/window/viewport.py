@@ -278,6 +278,9 @@ class Viewport:
 
         size: of the panel in framebuffer pixels. touched: when the last key or pointer event came,
         on the clock of `state.now`.
+
+        Raises:
+            GraphicsError: the driver refused tiles; the next picture is of quads.
         """
         if self.picture is None or state.scene.info is None or min(size) < 8:
             return float("inf")
@@ -291,11 +294,23 @@ class Viewport:
             if self._warmed():
                 return 0.0
             self._warming = None
-        wait = self.picture.update(state, self._stand, touched)
+        wait = self._drawn(self.picture, state, touched)
         if self._own is not None:
             self._forget_look()
         resting = wait == float("inf")  # a trial between frames of a moving camera would hold them up
         return 0.0 if resting and self._tried() else wait
+
+    def _drawn(self, picture: ScenePicture, state: State, touched: float) -> float:
+        try:
+            return picture.update(state, self._stand, touched)
+        except moderngl.Error as error:
+            if self._way != "tiles":
+                raise
+            self._take(self._made(), "quads")
+            raise GraphicsError(
+                "the graphics driver refuses tiles, so quads are drawn; choose Quads under Drawing in the "
+                "preferences"
+            ) from error
 
     # --- what is shown ----------------------------------------------------------------------
 

@@ -4,6 +4,7 @@ import time
 from collections.abc import Iterator
 from dataclasses import replace
 
+import moderngl
 import numpy as np
 import pytest
 import torch
@@ -29,6 +30,7 @@ from app.window.state import State
 from app.window.viewport import Viewport
 from langflash_core.base import pictures
 from langflash_core.base.graphics import COMPUTE
+from langflash_core.errors import GraphicsError
 from langflash_core.geometry.nearness import NEAREST
 from langflash_core.geometry.poses import Vector, from_view, orbit
 from langflash_core.language.relevance import compile_query
@@ -212,6 +214,22 @@ def test_a_window_that_is_closed_during_a_trial_makes_it_anew(viewport, on_trial
     viewport.release()
     assert on_trial == ["step", "end"]
     assert viewport.warm() and on_trial == ["step", "end", "step"]
+
+
+def test_a_driver_that_refuses_tiles_draws_quads_and_says_so_once(viewport, on_trial, monkeypatch) -> None:
+    def refuse(*_):
+        raise moderngl.Error("this driver compiles nothing")
+
+    monkeypatch.setattr(TiledSplats, "project", refuse)
+    scene = spoken_room()
+    state = showing(scene).with_asking(prompts=())
+    viewport.draw_with("tiles")
+    viewport.set_scene(1, scene)
+    with pytest.raises(GraphicsError, match="choose Quads"):
+        next(frame for frame in living(viewport, state) if viewport.whole)
+    next(frame for frame in living(viewport, state) if viewport.whole)
+    assert viewport.stats(card="A card").renderer == "A card, quads" and not on_trial
+    assert viewport.seen().max() > 100
 
 
 def test_pictures_that_move_and_that_rest_are_in_the_light_of_their_place(viewport) -> None:
