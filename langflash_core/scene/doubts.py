@@ -66,6 +66,8 @@ def doubt_line(record: Record, num_views: int) -> str:
         (found.blurred, "is blurred where it was taken", "are blurred where they were taken"),
     )
     parts = [f"{_photos(views)} {one if len(views) == 1 else many}" for views, one, many in whole if views]
+    if 1 < num_views == len(found.torn):
+        parts[0] = f"none of the {num_views} photos meets those beside it"
     if not parts:
         return ""
     gaps = list(dict.fromkeys(found.gap(view) for view in sorted((*found.torn, *found.alone))))

@@ -44,7 +44,7 @@ from langflash_core.language.spoken import compile_spoken
 from langflash_core.scene.exposure import lit_camera
 from langflash_core.scene.tour import read_tour
 from langflash_core.types import NO_LANGUAGE, Camera, Frame, Scene
-from langflash_core.writing.cameras import camera_of
+from langflash_core.writing.cameras import camera_of, kept_size
 from langflash_core.writing.encoding import open_encoder
 from langflash_core.writing.job import Job
 from langflash_core.writing.renderers import Renderer
@@ -109,19 +109,20 @@ def way(
 
     Args:
         path: photos (None), orbit, tour, or a file of key frames. shown: the part of the scene that is drawn.
+        size: None: that of the first photo that the scene keeps, or of the key frames.
 
     Raises:
         ViewError: the key frames cannot be used, or the scene has no tour.
     """
     if path == "tour":
-        stops, size = read_tour(scene.record.tour).stops, even(size or scene.view_size)
+        stops, size = read_tour(scene.record.tour).stops, even(size or kept_size(scene, 0))
         if not stops:
             raise ViewError(
                 'the scene has no tour; give it stops with: langflash tour stop SCENE "The window"'
             )
         return [to_camera(pose, *size) for pose in along_stops([stop.pose for stop in stops], seconds)]
     if path in (None, "photos", "orbit"):
-        width, height = even(size or scene.view_size)
+        width, height = even(size or kept_size(scene, 0))
         views = _poses(scene)
         around = _turn(views[0], shown) if path == "orbit" else None
         count = max(1, round(RATE * (seconds or FILMING.seconds)))

@@ -53,13 +53,22 @@ def test_all_of_them_are_one_sentence():
 def test_many_are_counted():
     count = 30
     record = Record(
-        foreseen={"covered": [1.0] * count, "alike": [0.1] * count, "nearest": [1, *range(count - 1)]}
+        foreseen={
+            "covered": [1.0] * count,
+            "alike": [0.9, *[0.1] * (count - 1)],
+            "nearest": [1, *range(count - 1)],
+        }
     )
     line = doubt_line(record, count)
     assert (
-        "photos 1, 2, 3, 4, 5, 6 and 24 others do not meet" in line
+        "photos 2, 3, 4, 5, 6, 7 and 23 others do not meet" in line
         and "between them and their neighbours," in line
     )
+
+
+def test_where_no_photo_meets_another_none_is_numbered():
+    line = doubt_line(told(covered=[1.0] * 4, alike=[0.1] * 4), 4)
+    assert line.startswith("none of the 4 photos meets those beside it; take more photos between 1 and 2")
 
 
 def test_old_scenes_whose_photos_came_out_badly():

@@ -1,7 +1,9 @@
 """Films: their ways, their kinds, and what is wrong with key frames."""
 
+import io
 import json
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,9 +15,11 @@ from langflash_core import pipeline
 from langflash_core.errors import ViewError
 from langflash_core.export.png import heat_over, to_8bit
 from langflash_core.geometry.cameras import rotation_angle_degrees
+from langflash_core.scene.tour import told_tour
 from langflash_core.writing import films as video
 from langflash_core.writing.renderers import TorchRenderer
 from tests.app.cli.conftest import stripes
+from tests.scene.test_tour import TOUR
 
 K = [[35.0, 0.0, 28.0], [0.0, 35.0, 21.0], [0.0, 0.0, 1.0]]
 TORCH = ("--backend", "torch")
@@ -108,6 +112,15 @@ def test_an_orbit_is_a_circle_that_looks_inwards():
     assert looks.min() > 0.999
     steps = np.linalg.norm(np.diff(np.concatenate((places, places[:1])), axis=0), axis=1)
     assert steps.std() < 1e-4 * steps.mean()  # it closes, at one speed
+
+
+@pytest.mark.parametrize("path", [None, "orbit", "tour"])
+def test_a_film_without_a_size_is_as_large_as_the_photos(path):
+    stored = io.BytesIO()
+    Image.new("RGB", (131, 98)).save(stored, "JPEG")
+    scene = replace(stripes(), photos=(stored.getvalue(),) * 2).with_record(tour=told_tour(TOUR))
+    (first, *_) = video.way(path, scene, scene, None, 0.1)
+    assert (first.width, first.height) == (130, 98) != scene.view_size
 
 
 def test_an_orbit_around_what_was_found(run, scene_file):
