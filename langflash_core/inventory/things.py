@@ -117,8 +117,9 @@ class Inventory:
     def __repr__(self) -> str:
         """Three lines: how many things, of which kinds, in which unit."""
         kinds = ", ".join(f"{count} × {kind}" for kind, count in self.counts.items())
+        count = len(self.things)
         return (
-            f"Inventory: {len(self.things)} things (inventory.things)\n"
+            f"Inventory: {count} thing{'s' * (count != 1)} (inventory.things)\n"
             f"  {kinds or '-'}\n"
             f"  lengths in {self.unit}{', a guess' if self.guess else ''}"
         )

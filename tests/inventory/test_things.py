@@ -55,6 +55,11 @@ def test_two_chairs_a_table_and_a_door_are_found_where_they_stand(found):
     assert set(table.photos) == {0, 1} and table.id == "table 1" == table.title
 
 
+def test_one_thing_is_told_as_one(found):
+    assert repr(found).startswith("Inventory: 4 things (")
+    assert repr(replace(found, things=found.things[:1])).startswith("Inventory: 1 thing (")
+
+
 def test_the_corners_of_a_thing_are_those_of_its_box(found):
     (table,) = (thing for thing in found.things if thing.kind == "table")
     sides = np.linalg.norm(np.diff(table.corners, axis=0), axis=1)

@@ -95,7 +95,7 @@ class ExportBegan:
     target: Path
 
     def apply(self, state: State) -> State:
-        return replace(state, dialog=None).with_exporting(running=Running(self.target))
+        return replace(state, dialog=None).with_exporting(running=Running(self.target, started=state.now))
 
 
 @dataclass(frozen=True)

@@ -197,11 +197,11 @@ def draw_progress(state: State, look: Look) -> list[do.Command]:
         return []
     imgui.separator()
     widgets.gap(look.px(2))
-    stage = "stopping" if now.cancelling else now.stage
-    room = imgui.get_content_region_avail().x - imgui.calc_text_size(f"{stage}   ").x
+    told = now.told(state.now)
+    room = imgui.get_content_region_avail().x - imgui.calc_text_size(f"{told}   ").x
     imgui.text_unformatted(widgets.shortened(f"Exporting {now.target.name}", room))
     with widgets.colours(text=theme.MUTED):
-        widgets.at_right_edge(stage)
+        widgets.at_right_edge(told)
     fraction = now.fraction if now.fraction >= 0 else -0.6 * state.now
     imgui.progress_bar(fraction, ImVec2(-1, look.px(8)), "")
     stop, wide = f"{fa.ICON_FA_STOP}  Stop the export", ImVec2(-1, 0)

@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from langflash_core.base.outputs import RGB, Output
+from langflash_core.base.running import time_left
 
 SECONDS = (1.0, 60.0)
 
@@ -31,12 +32,17 @@ class ExportForm:
 
 @dataclass(frozen=True)
 class Running:
-    """An export under way. fraction: 0 to 1, below 0 while nothing is known."""
+    """An export under way. fraction: 0 to 1, below 0 while nothing is known. started: by `State.now`."""
 
     target: Path
     stage: str = "starting"
     fraction: float = -1.0
     cancelling: bool = False
+    started: float = 0.0
+
+    def told(self, now: float) -> str:
+        """What is being done, or how long it still takes once that is known."""
+        return "stopping" if self.cancelling else time_left(now - self.started, self.fraction) or self.stage
 
 
 NO_FORM = ExportForm()

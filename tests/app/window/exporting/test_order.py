@@ -165,6 +165,14 @@ def test_an_export_is_followed_to_its_end() -> None:
     assert "no scene" in told(after(State(), export.ShowExport()))
 
 
+def test_a_long_export_says_how_long_it_takes() -> None:
+    state = after(replace(scene(), now=100.0), export.ExportBegan(Path("/x.mp4")))
+    running = after(state, export.ExportProgressed("drawing", 0.25)).exporting.running
+    assert running is not None and running.told(101.0) == "drawing"
+    assert running.told(160.0) == "about 3 min left"
+    assert replace(running, cancelling=True).told(160.0) == "stopping"
+
+
 def test_an_export_never_replaces_a_photo() -> None:
     """Neither by the name it offers, nor by one that is typed, nor by one of several views' files."""
     photos = (Photo(Path("/p/left.png")), Photo(Path("/p/left_1.png")))
