@@ -5,7 +5,7 @@ import itertools
 import json
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -76,6 +76,7 @@ def write_film(job: Job) -> str:
         shown = pipeline.select(scene, job.prompts, threshold=request.threshold)
     cameras = way(request.path, scene, shown, request.size, request.seconds)
     with job.renderer() as renderer, staged_folder(request.output.parent) as staging:
+        heat = heat and heat.steady(shown, cameras, renderer)
         write(staging / request.output.name, shown, cameras, renderer, job.progress, heat, job.colours)
     return f"{len(cameras) / RATE:.1f} s, {cameras[0].width} x {cameras[0].height}"
 
@@ -89,8 +90,20 @@ class Heat:
 
     def lit_from(self, frame: Frame, relevance: Float[Tensor, "1 H W"]) -> float:
         """The relevancy from which pixels of this picture belong to its answer."""
-        scores = presence_scores(relevance, frame.alphas >= ANSWERING.covered_alpha)
-        return lit_from(scores, self.compiled, self.threshold)[0]
+        return lit_from(_scores(frame, relevance), self.compiled, self.threshold)[0]
+
+    def steady(self, scene: Scene, cameras: Sequence[Camera], renderer: Renderer) -> "Heat":
+        """Lit from the same relevancy in all frames, as the surest of some is: a score beside the threshold
+        would flicker."""
+        asked = cameras[:: max(1, len(cameras) // FILMING.asked)]
+        scores = torch.cat([_scores(*renderer.answered(scene, each, self.compiled)) for each in asked])
+        return replace(
+            self, threshold=lit_from(scores.amax(0, keepdim=True), self.compiled, self.threshold)[0]
+        )
+
+
+def _scores(frame: Frame, relevance: Float[Tensor, "P H W"]) -> Float[Tensor, " P"]:
+    return presence_scores(relevance, frame.alphas >= ANSWERING.covered_alpha)
 
 
 def compile_phrase(scene: Scene, phrase: str, threshold: float | None) -> Heat:

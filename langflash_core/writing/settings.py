@@ -17,6 +17,9 @@ class Filming:
     """Radians of yaw and pitch around a single photo: further out are holes."""
     middle: tuple[float, float] = (0.02, 0.98)
     """Of what is orbited: stray Gaussians do not count."""
+    asked: int = 8
+    """Frames at least, if there are so many, in which a heat-map's phrase is scored: one drawing in twenty
+    of a usual film."""
 
 
 FILMING = Filming()

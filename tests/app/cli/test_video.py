@@ -15,6 +15,7 @@ from langflash_core import pipeline
 from langflash_core.errors import ViewError
 from langflash_core.export.png import heat_over, to_8bit
 from langflash_core.geometry.cameras import rotation_angle_degrees
+from langflash_core.scene.file import load
 from langflash_core.scene.tour import told_tour
 from langflash_core.writing import films as video
 from langflash_core.writing.renderers import TorchRenderer
@@ -155,6 +156,17 @@ def test_a_film_is_lit_from_where_the_mask_is(threshold):
     lit = heat_over(found.relevance[0], found.frame.rgb, found.answers[0].lit_from, found.mode)
     picture = video.picture(scene, scene.camera(0), TorchRenderer(), heat)
     np.testing.assert_array_equal(picture, to_8bit(lit))
+
+
+def test_a_film_is_lit_from_one_relevancy_in_all_frames(done, scene_file, tmp_path, monkeypatch):
+    shown = []
+    monkeypatch.setattr(video, "write", lambda path, *args: shown.append(args[4]) or path.write_bytes(b"-"))
+    words = ("--what", "heat", "--prompt", "armchair", "--seconds", "0.4", *TORCH)
+    done("export", scene_file, "-o", tmp_path / "a.webp", *words)
+    done("export", scene_file, "-o", tmp_path / "b.webp", *words, "--threshold", "0.8")
+    (answer,) = pipeline.query(load(scene_file), "armchair", render=TorchRenderer()).answers
+    assert answer.lit_from > answer.threshold + 0.05
+    assert shown[0].threshold == pytest.approx(answer.lit_from, abs=0.01) and shown[1].threshold == 0.8
 
 
 def test_gl_reads_the_colours_that_the_frame_has():
