@@ -114,9 +114,10 @@ def _line(entry: dict[str, Any], unit: str) -> str:
     near = ANSWERING.maybe_from(entry["threshold"]) <= entry["score"] < entry["threshold"]
     found = "found    " if entry["found"] else "maybe    " if near else "not found"
     read = f" (read as: {entry['reading']})" if entry["reading"] else ""
-    line = (
-        f"{found}  {entry['prompt']}{read}: score {entry['score']:.3f} (threshold {entry['threshold']:.3f})"
-    )
+    score = entry["score"]
+    if near:  # rounded up it would be the threshold
+        score = min(score, entry["threshold"] - 0.001)
+    line = f"{found}  {entry['prompt']}{read}: score {score:.3f} (threshold {entry['threshold']:.3f})"
     if entry["found"]:
         where = ", ".join(f"{value:.2f}" for value in entry["centroid"])
         line += f", {entry['area']:.1%} of the picture, at ({where}) {'m' if unit == 'm' else 'scene units'}"

@@ -238,9 +238,9 @@ def phrases_markdown(name: str, verdicts: Sequence[Verdict]) -> str:
     """Shares, and which phrases got which verdict."""
     counted = shares(verdicts)
     lines = [f"| {name}, {len(verdicts)} phrases | share | phrases |", "|---|---|---|"]
-    for kind in (*THERE, *ABSENT):
+    for kind in (kind for kind in (*THERE, *ABSENT) if kind in counted):
         some = [one for one in verdicts if one.verdict == kind]
         said = ", ".join(f"{one.phrase} ({one.score:.2f})" for one in some)
-        lines.append(f"| {kind} | {100 * counted.get(kind, 0.0):.0f} % | {said} |")
+        lines.append(f"| {kind} | {100 * counted[kind]:.0f} % | {said} |")
     lines.append(f"| wrong above {SURE} | {100 * counted['confident']:.0f} % | |")
     return "\n".join(lines) + "\n"

@@ -71,6 +71,7 @@ def test_shares_are_of_what_is_there_and_of_what_is_not():
         "honest": 0.5, "claimed": 0.5, "confident": 0.25,
     }  # fmt: skip
     assert "| wrong | 100 % | b (0.95) |" in phrases_markdown("home", some[1:])
+    assert "honest" not in phrases_markdown("home", some[:2])  # nobody asked for what is not there
 
 
 def test_thirty_phrases_with_modifiers_of_every_kind():
