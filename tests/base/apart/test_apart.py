@@ -60,7 +60,14 @@ def odd(monkeypatch, tmp_path: Path):
         own = Path(apart.__file__).with_name(file)
         (package / file).write_text(own.read_text())
     core = Path(apart.__file__).parents[2]
-    for file in ("__init__.py", "errors.py", "base/__init__.py", "base/limits.py", "base/threads.py"):
+    for file in (
+        "__init__.py",
+        "errors.py",
+        "base/__init__.py",
+        "base/devices.py",
+        "base/limits.py",
+        "base/threads.py",
+    ):
         (tmp_path / "langflash_core" / file).write_text((core / file).read_text())
     (package / "odd.py").write_text(ODD)
     monkeypatch.setitem(serving.READERS, "odd", "odd")
