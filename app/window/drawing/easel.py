@@ -87,6 +87,10 @@ class Easel:
     def mark(self, marked: Marked) -> None:
         """Bring edits to the renderer."""
         before, self.marked = self.marked, marked
+        if before is not None and (marked.changes, marked.marks.visible) != (
+            before.changes, before.marks.visible
+        ):  # fmt: skip
+            self._chosen = frozenset()  # of what is left "red armchair" has to be told anew
         if marked.changes != (before.changes if before else ()):
             self.renderer.change(marked.changes)
         self.renderer.mark(*marked.shown)

@@ -581,3 +581,35 @@ def test_an_answer_that_comes_behind_its_picture_is_asked_for_again(viewport) ->
     viewport.narrow(first.name, first.relevance)
     second = rested()
     assert second.name == first.name and second.relevance.shape == first.relevance.shape
+
+
+def test_an_edit_takes_the_heat_of_a_chosen_phrase_until_it_is_told_anew(viewport) -> None:
+    """Behind a deleted thing every armchair lit up as the red one, while the worker was busy."""
+    scene = spoken_room()
+    state = showing(scene, mode=pictures.HEAT)
+    viewport.set_scene(1, scene)
+    query = compile_spoken(scene, language_space("minilm"), ["red armchair"])
+    viewport.ask((state.asking.prompts[0].key,), query, state.asking.revision)
+    marks = state.editing.marks
+    assert marks is not None
+    viewport.mark(SceneMemory(scene), marks, None)
+
+    def shown(mode: pictures.Picture) -> np.ndarray:
+        for _ in living(viewport, state.with_scene(mode=mode), count=600):
+            if viewport.whole and not viewport.settling:
+                break
+        pixels = viewport.seen()
+        assert pixels is not None
+        return pixels
+
+    for frame in living(viewport, state, count=600):
+        view = viewport.view(frame)
+        if view is not None and viewport.whole and not viewport.settling:
+            viewport.narrow(view.name, view.relevance)
+            break
+    assert not np.array_equal(shown(pictures.HEAT), shown(pictures.RGB))
+    rows = Mask.first(marks.selected.count, 90)
+    viewport.mark(SceneMemory(scene), replace(marks, selected=rows), None)
+    assert not np.array_equal(shown(pictures.HEAT), shown(pictures.RGB)), "a selection changes no answer"
+    viewport.mark(SceneMemory(scene), delete(marks, rows), None)
+    assert np.array_equal(shown(pictures.HEAT), shown(pictures.RGB))
