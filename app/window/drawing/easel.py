@@ -74,7 +74,7 @@ class Easel:
         self._times_marked = 0
         self._painted: tuple | None = None  # all that the texture shows
         self._scored: tuple | None = None  # picture and question of the last view
-        self._chosen = frozenset[str]()  # phrases that chose among what answers their heads, last
+        self._told: tuple[Drawn, Asked] | None = None  # picture and question that were narrowed last
 
     # --- what to show -----------------------------------------------------------------------
 
@@ -87,10 +87,6 @@ class Easel:
     def mark(self, marked: Marked) -> None:
         """Bring edits to the renderer."""
         before, self.marked = self.marked, marked
-        if before is not None and (marked.changes, marked.marks.visible) != (
-            before.changes, before.marks.visible
-        ):  # fmt: skip
-            self._chosen = frozenset()  # of what is left "red armchair" has to be told anew
         if marked.changes != (before.changes if before else ()):
             self.renderer.change(marked.changes)
         self.renderer.mark(*marked.shown)
@@ -162,6 +158,10 @@ class Easel:
         if (mode.answers or mode.columns) and not tells():
             return
         active = next((i for i, p in enumerate(asked) if p.key == state.asking.active), 0)
+        if mode.answers and not self._chosen(mode, active):
+            if self._stays(active):
+                return
+            mode = pictures.RGB
         fill, faded = fills_gaps(state), mode is pictures.RGB and keeps_near(state, self.drawn.pose)
         shown_from = asked[active].shown_from if asked else 0.0
         colours, cuts = tuple(p.colour for p in asked), tuple(p.lit_from for p in asked)
@@ -174,14 +174,32 @@ class Easel:
         self.texture = self.renderer.faded_texture() if faded else PAINTS[mode](self.renderer, wanted)
 
     def _mode(self, state: State, drawn: Drawn, asked: list[Prompt]) -> Picture:
-        """That is wanted, or colours where the picture, the question or the scene lack what it needs; also
-        until "red armchair" is told from every armchair."""
+        """That is wanted, or colours where the picture, the question or the scene lack what it needs."""
         if not drawn.plan.covers(replace(drawn.plan, kind=kind_of(state))):
             return pictures.RGB
-        unchosen = not _choosing(self.asked.query) <= self._chosen
-        if state.scene.mode.answers and (not asked or len(asked) != len(self.asked.keys) or unchosen):
+        if state.scene.mode.answers and (not asked or len(asked) != len(self.asked.keys)):
             return pictures.RGB
         return state.scene.mode if possible(state.scene.mode, state.scene.info) else pictures.RGB
+
+    def _chosen(self, mode: Picture, active: int) -> bool:
+        """Whether what the mode shows of this picture is told from all that answers a phrase's head, "red
+        armchair" from every armchair."""
+        readings = self.asked.query.readings if self.asked.query else ()
+        if not any(each.narrows for each in (readings[active : active + 1] if mode.one else readings)):
+            return True
+        return (
+            self._told is not None
+            and self._told[0] == self.drawn
+            and self._told[1].number == self.asked.number
+        )
+
+    def _stays(self, active: int) -> bool:
+        """Whether what was told last is of the same place and phrase, and may stay on show until this is."""
+        if self._told is None or self.drawn is None or self.asked.query is None:
+            return False
+        drawn, asked = self._told
+        same = asked.query is not None and self.asked.query.texts[active] in asked.query.texts
+        return same and replace(drawn, plan=self.drawn.plan) == self.drawn
 
     # --- what it says -----------------------------------------------------------------------
 
@@ -249,15 +267,7 @@ class Easel:
             self._scored = None
         elif name == self._scored:
             self.renderer.narrow(relevance)
-            self._chosen, self._painted = _choosing(self.asked.query), None
-
-
-def _choosing(query: "CompiledQuery | None") -> frozenset[str]:
-    """Phrases that choose among what answers their heads."""
-    if query is None:
-        return frozenset()
-    read = zip(query.texts, query.readings, strict=False)  # no readings: all are asked as they stand
-    return frozenset(text for text, reading in read if reading.narrows)
+            self._told, self._painted = (self.drawn, self.asked), None
 
 
 def _place(camera: "Camera", x: int, y: int, depth: float) -> tuple[float, float, float]:
