@@ -15,7 +15,7 @@ from scipy.spatial import KDTree
 from langflash_core.base.records import World
 from langflash_core.geometry.rotations import turn_of
 from langflash_core.geometry.surfels import covered_areas, normals_of
-from langflash_core.inventory.pieces import OPENINGS, kinds_of
+from langflash_core.inventory.pieces import KINDS, OPENINGS, kinds_of
 from langflash_core.inventory.settings import FLOOR_PLAN
 from langflash_core.types import Scene
 
@@ -55,7 +55,8 @@ def upright_of(
     length = np.linalg.norm(flat, axis=1)
     kinds, areas = kinds_of(scene), covered_areas(scene.gaussians)
     upright = (np.abs(normals[:, 1]) < FLOOR_PLAN.upright) & (length > 0.5)
-    chosen = np.isin(kinds, ("wall", *OPENINGS)) & upright & (areas > 0) & np.isfinite(stands).all(1)
+    walls = np.isin(kinds, [KINDS.index(name) for name in ("wall", *OPENINGS)])
+    chosen = walls & upright & (areas > 0) & np.isfinite(stands).all(1)
     places, weights = stands[chosen][:, [0, 2]], areas[chosen]
     if len(eyes):
         weights = weights / np.maximum(KDTree(eyes).query(places)[0], FLOOR_PLAN.nearest * metre)

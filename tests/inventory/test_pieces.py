@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from langflash_core.inventory.pieces import STRUCTURE, Pieces, parts_of_room
+from langflash_core.inventory.pieces import KINDS, STRUCTURE, Pieces, kinds_of, parts_of_room
 from langflash_core.inventory.settings import PRESENCE
 from langflash_core.language.vocabulary import OWN
 from langflash_core.segments import photo_shares
@@ -103,3 +103,11 @@ def test_a_room_has_walls_among_its_parts_and_a_scene_of_nothing_has_none():
     assert min(parts.cosines) > parts.present
     nothing = parts_of_room(room, np.zeros(len(room.gaussians)))
     assert nothing.kinds == () and (nothing.numbers == -1).all()
+
+
+def test_kinds_are_numbers_for_words_of_millions_hold_up_the_window():
+    scene = box_room()
+    kinds = kinds_of(scene)
+    assert kinds.dtype.kind == "i" and kinds.shape == (len(scene.gaussians),)
+    assert {KINDS[kind] for kind in np.unique(kinds)} >= {"wall"}
+    assert (kinds_of(scene, threshold=1.1) == 0).all(), "nothing is as sure as that"

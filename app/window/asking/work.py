@@ -186,7 +186,7 @@ def _divided(scene: "Scene", members: np.ndarray, kinds: np.ndarray, shares: "Te
     from langflash_core.segments import connected_things
 
     numbers = np.zeros(len(members), np.int64)
-    for kind in sorted(set(kinds[members])):
+    for kind in np.unique(kinds[members]):
         own = connected_things(scene, torch.from_numpy(members & (kinds == kind)), shares).numpy()
         numbers[own > 0] = own[own > 0] + numbers.max(initial=0)
     if not numbers.any():
@@ -203,6 +203,7 @@ def _part(
 ) -> Part:
     """What there is to say of one part; own: (N,) bool, shares: (V,) of photos."""
     from langflash_core.geometry.surfels import covered_areas
+    from langflash_core.inventory.pieces import KINDS
 
     some = scene.rows(own)
     areas = covered_areas(some.gaussians) + 1e-12
@@ -211,9 +212,9 @@ def _part(
     place = means[
         np.linalg.norm(means - middle, axis=1).argmin()
     ]  # on the thing, not between two of its ends
-    names, counts = np.unique(kinds[own.numpy()], return_counts=True)
+    places, counts = np.unique(kinds[own.numpy()], return_counts=True)
     sure = float(np.average(relevance[own].numpy(), weights=areas))
-    return Part(str(names[counts.argmax()]), sure, float(shares.max()), Vector(*place.tolist()), rows)
+    return Part(KINDS[places[counts.argmax()]], sure, float(shares.max()), Vector(*place.tolist()), rows)
 
 
 @dataclass(frozen=True)
