@@ -74,7 +74,8 @@ class Easel:
         self._times_marked = 0
         self._painted: tuple | None = None  # all that the texture shows
         self._scored: tuple | None = None  # picture and question of the last view
-        self._told: tuple[Drawn, Asked] | None = None  # picture and question that were narrowed last
+        self._told: tuple[Drawn, Asked] | None = None  # of this place, picture and question narrowed last
+        self._narrowed = False  # whether these are on show
 
     # --- what to show -----------------------------------------------------------------------
 
@@ -82,6 +83,7 @@ class Easel:
         """Ask other phrases, as `Asked` has them."""
         self.asked = Asked(keys, query, revision, self.asked.number + 1)
         self._painted = self._scored = None
+        self._narrowed = False
         self.renderer.ask(query)
 
     def mark(self, marked: Marked) -> None:
@@ -142,6 +144,9 @@ class Easel:
 
     def _takes(self, name: Drawn, seconds: float, size: tuple[int, int]) -> None:
         self.drawn, self.seconds, self.size, self._painted = name, seconds, size, None
+        self._scored, self._narrowed = None, False
+        if self._told is not None and replace(self._told[0], plan=name.plan) != name:
+            self._told = None
 
     # --- how it is shown --------------------------------------------------------------------
 
@@ -185,21 +190,13 @@ class Easel:
         """Whether what the mode shows of this picture is told from all that answers a phrase's head, "red
         armchair" from every armchair."""
         readings = self.asked.query.readings if self.asked.query else ()
-        if not any(each.narrows for each in (readings[active : active + 1] if mode.one else readings)):
-            return True
-        return (
-            self._told is not None
-            and self._told[0] == self.drawn
-            and self._told[1].number == self.asked.number
-        )
+        meant = readings[active : active + 1] if mode.one else readings
+        return self._narrowed or not any(each.narrows for each in meant)
 
     def _stays(self, active: int) -> bool:
-        """Whether what was told last is of the same place and phrase, and may stay on show until this is."""
-        if self._told is None or self.drawn is None or self.asked.query is None:
-            return False
-        drawn, asked = self._told
-        same = asked.query is not None and self.asked.query.texts[active] in asked.query.texts
-        return same and replace(drawn, plan=self.drawn.plan) == self.drawn
+        """Whether what was told last of this place is of the same phrase, and stays on show until this is."""
+        before, now = self._told[1].query if self._told else None, self.asked.query
+        return before is not None and now is not None and now.texts[active] in before.texts
 
     # --- what it says -----------------------------------------------------------------------
 
@@ -261,13 +258,10 @@ class Easel:
         return Numbers(renderer.frame(), renderer.relevance(), others)
 
     def narrow(self, name: tuple, relevance: "Tensor") -> None:
-        """Show this relevance (P, H, W), if the picture and the question of `View.name` are on show; if
-        another picture came meanwhile, the next that rests is scored again."""
-        if name == self._scored and name[0] != self.drawn:
-            self._scored = None
-        elif name == self._scored:
+        """Show this relevance (P, H, W), if the picture and the question of `View.name` are still on show."""
+        if name == self._scored and self.drawn is not None:
             self.renderer.narrow(relevance)
-            self._told, self._painted = (self.drawn, self.asked), None
+            self._told, self._narrowed, self._painted = (self.drawn, self.asked), True, None
 
 
 def _place(camera: "Camera", x: int, y: int, depth: float) -> tuple[float, float, float]:

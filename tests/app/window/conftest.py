@@ -1,5 +1,6 @@
 """Every test of the window has folders of its own: no test reads or writes a person's; and a room to show."""
 
+from collections.abc import Iterator
 from pathlib import Path
 
 import pytest
@@ -9,6 +10,7 @@ from app.window.scene.commands import SceneArrived
 from app.window.scene.state import SceneInfo
 from app.window.scene.work import describe_scene
 from app.window.state import State
+from app.window.viewport import Viewport
 from tests.app.window.scenes import after, room
 
 
@@ -37,3 +39,11 @@ def info() -> SceneInfo:
 @pytest.fixture
 def shown(info: SceneInfo) -> State:
     return after(State(), SceneArrived(info))
+
+
+@pytest.fixture
+def viewport(context) -> Iterator[Viewport]:
+    with context:
+        made = Viewport(context)
+        yield made
+        made.release()

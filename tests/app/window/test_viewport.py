@@ -15,12 +15,9 @@ from app.gl.scene import Thinned
 from app.gl.tiled import trial
 from app.gl.tiled.splats import TiledSplats
 from app.gl.tiled.trial import Trial
-from app.window.asking.commands import Answered, Narrowed
-from app.window.asking.work import Answer
 from app.window.drawing.card import CardPicture
 from app.window.drawing.processor import ProcessorPicture
 from app.window.drawing.stills import RETRY_SECONDS
-from app.window.drawing.values import View
 from app.window.governor import Governor, Kind, Plan
 from app.window.scene import commands as show
 from app.window.scene.commands import SceneArrived
@@ -35,7 +32,6 @@ from langflash_core.geometry.nearness import NEAREST
 from langflash_core.geometry.poses import Vector, from_view, orbit
 from langflash_core.language.relevance import compile_query
 from langflash_core.language.spaces import language_space
-from langflash_core.language.spoken import compile_spoken
 from langflash_core.scene.edited import first_marks
 from langflash_core.scene.edits import History, delete
 from langflash_core.scene.exposure import lit_camera
@@ -60,14 +56,6 @@ class Stubborn(Governor):
 
     def moving(self, wanted: Kind) -> Plan:
         return Plan(wanted, 0.75)
-
-
-@pytest.fixture
-def viewport(context) -> Iterator[Viewport]:
-    with context:
-        made = Viewport(context)
-        yield made
-        made.release()
 
 
 def spoken_room() -> Scene:
@@ -494,122 +482,3 @@ def test_the_coarse_ones_of_a_large_scene_are_taken_beside_the_frames(viewport, 
     assert isinstance(picture, ProcessorPicture) and picture.governor.share == share
     live = viewport._made()._scene
     assert live is not None and {*live._levels} == {share}
-
-
-@pytest.mark.parametrize("picture", [ProcessorPicture, CardPicture])
-def test_what_a_phrase_does_not_mean_leaves_the_picture_and_no_splat_is_drawn(viewport, picture) -> None:
-    """The armchair is red and stands before the wall: by its colour and its place it is told from others."""
-    space = language_space("minilm")
-    scene = spoken_room()
-    state = showing(scene, mode=pictures.HEAT)
-    viewport.set_scene(1, scene)
-    if picture is CardPicture:
-        viewport.picture = CardPicture(viewport._made(), 1, scene)
-
-    def shown() -> np.ndarray:
-        viewport.update(state, SIZE, touched=0.0)
-        pixels = viewport.seen()
-        assert pixels is not None
-        return pixels
-
-    def ask(*phrases: str) -> None:
-        nonlocal state
-        query = compile_spoken(scene, space, phrases)
-        asked = tuple(
-            replace(state.asking.prompts[0], key=key, text=phrase, calibrated=query.threshold)
-            for key, phrase in enumerate(phrases)
-        )
-        state = state.with_asking(prompts=asked)
-        viewport.ask(tuple(range(len(phrases))), query, state.asking.revision)
-
-    def seen(phrase: str) -> tuple[Narrowed | None, Answered, np.ndarray]:
-        """The answer, and the picture once it is narrowed."""
-        nonlocal state
-        ask(phrase)
-        view, frames = None, living(viewport, state, count=600)
-        for state in frames:
-            view = viewport.view(state) or view
-            whole = viewport.whole and not viewport.settling
-            if whole and view is not None and tuple(view.frame.alphas.shape) == SIZE[::-1]:
-                break
-        assert view is not None
-        done = Answer(1, view).run(lambda: False)
-        told = [each for each in done if isinstance(each, Narrowed | Answered)]
-        narrowed = next((each for each in told if isinstance(each, Narrowed)), None)
-        if narrowed is not None:
-            assert np.array_equal(shown(), colours), "until then every armchair would light up under its name"
-            viewport.narrow(narrowed.name, narrowed.relevance)
-        pixels = shown()
-        return narrowed, next(each for each in told if isinstance(each, Answered)), pixels.astype(int)
-
-    _, _, plain = seen("armchair")
-    heat, state = state, state.with_scene(mode=pictures.RGB)
-    colours, state = shown(), heat
-    passes = dict(viewport.stats().passes)
-    kept, _, red = seen("red armchair in front of the wall")
-    ask("red armchair in front of the wall", "door")
-    assert not np.array_equal(shown(), colours), "a second phrase takes no heat from the first"
-    gone, none, blue = seen("blue armchair")
-    assert kept is not None and gone is not None and float(kept.relevance.max()) > 0.9
-    assert none.scores[0][2] == 0 and gone.notes[0][2] == "no armchair here looks blue"
-    assert abs(red - plain).max() <= 1 and abs(blue - plain).max() > 50, "a rounding; colours of heat"
-    again, _, whole = seen('"blue armchair"')
-    assert again is None and abs(whole - blue).max() > 50
-    after = dict(viewport.stats().passes)
-    splatted = ("colour", "weights")
-    assert [after.get(kind) for kind in splatted] == [passes.get(kind) for kind in splatted]
-
-
-def test_an_answer_that_comes_behind_its_picture_is_asked_for_again(viewport) -> None:
-    """The window closed: a smaller picture, of a hand that moves, was to be painted by the one before."""
-    scene = spoken_room()
-    state = showing(scene, mode=pictures.HEAT)
-    viewport.set_scene(1, scene)
-    query = compile_spoken(scene, language_space("minilm"), ["red armchair"])
-    viewport.ask((state.asking.prompts[0].key,), query, state.asking.revision)
-
-    def rested() -> View:
-        view = None  # is given once, also before the picture has settled
-        for frame in living(viewport, state, count=600):
-            view = viewport.view(frame) or view
-            if view is not None and viewport.whole and not viewport.settling:
-                return view
-        raise AssertionError("it never rests")
-
-    first = rested()
-    viewport.update(state, (SIZE[0] // 2, SIZE[1] // 2), touched=0.0)
-    viewport.narrow(first.name, first.relevance)
-    second = rested()
-    assert second.name == first.name and second.relevance.shape == first.relevance.shape
-
-
-def test_a_chosen_phrase_lights_nothing_in_a_picture_of_which_it_is_not_told(viewport) -> None:
-    """Behind an edit or a turn every armchair lit up as the red one, as long as the worker was busy."""
-    scene = spoken_room()
-    state = showing(scene, mode=pictures.HEAT)
-    viewport.set_scene(1, scene)
-    query = compile_spoken(scene, language_space("minilm"), ["red armchair"])
-    viewport.ask((state.asking.prompts[0].key,), query, state.asking.revision)
-    marks = state.editing.marks
-    assert marks is not None
-    viewport.mark(SceneMemory(scene), marks, None)
-
-    def lit(state: State, tell: bool = False) -> bool:
-        """Whether the resting picture shows heat."""
-        told, seen = False, {}
-        for mode in (pictures.HEAT, pictures.RGB):
-            for frame in living(viewport, state.with_scene(mode=mode), count=600):
-                view = viewport.view(frame) if tell else None
-                if view is not None and viewport.whole and not viewport.settling:
-                    viewport.narrow(view.name, view.relevance)
-                    told = True
-                elif viewport.whole and not viewport.settling and told == tell:
-                    break
-            seen[mode.name] = viewport.seen()
-        return not np.array_equal(seen["heat"], seen["rgb"])
-
-    assert not lit(state) and lit(state, tell=True)
-    viewport.mark(SceneMemory(scene), delete(marks, Mask.first(marks.selected.count, 90)), None)
-    assert not lit(state) and lit(state, tell=True)
-    turned = state.with_scene(pose=orbit(state.scene.pose, 0.1, 0.0))
-    assert not lit(turned) and lit(turned, tell=True)
