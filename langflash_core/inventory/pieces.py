@@ -84,15 +84,14 @@ def parts_of_room(scene: Scene, shares: Float[np.ndarray, " N"]) -> Parts:
     )
 
 
-def kinds_of(scene: Scene, threshold: float | None = None) -> Integer[np.ndarray, " N"]:
+def kinds_of(scene: Scene) -> Integer[np.ndarray, " N"]:
     """(N,) places in `KINDS`: the kind of each Gaussian by itself. Of millions an array of words takes half a
     second, in which no other thread runs."""
     names = list(OWN)
     compiled = compile_query(scene, language_space(scene.semantics.space), names)
     best, which = gaussian_relevance(scene.semantics, compiled).max(0)
-    limit = compiled.threshold if threshold is None else threshold
     places = np.array([KINDS.index(name) for name in names])
-    return np.where((best >= limit).numpy(), places[which.numpy()], 0)
+    return np.where((best >= compiled.threshold).numpy(), places[which.numpy()], 0)
 
 
 def _pieces(
