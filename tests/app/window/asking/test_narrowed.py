@@ -96,12 +96,12 @@ def red(viewport) -> State:
     return state
 
 
-def rested(viewport, state: State) -> View | None:
-    """The view that is to be scored of the picture at rest, if there is one."""
+def rested(viewport, state: State) -> View:
+    """The view that is to be scored of the picture at rest."""
     view = None  # is given once, also before the picture has settled
     for frame in living(viewport, state, count=600):
         view = viewport.view(frame) or view
-        if viewport.whole and not viewport.settling:
+        if view is not None and viewport.whole and not viewport.settling:
             return view
     raise AssertionError("it never rests")
 
@@ -117,8 +117,9 @@ def test_an_answer_that_comes_behind_its_picture_is_asked_for_again(viewport, re
 
 def test_a_chosen_phrase_lights_nothing_in_a_picture_of_which_it_is_not_told(viewport, red) -> None:
     """Behind an edit or a turn every armchair lit up as the red one, as long as the worker was busy."""
-    marks, scene = red.editing.marks, red.scene.info.scene
-    viewport.mark(SceneMemory(scene), marks, None)
+    marks, info = red.editing.marks, red.scene.info
+    assert marks is not None and info is not None
+    viewport.mark(SceneMemory(info.scene), marks, None)
 
     def lit(state: State) -> bool:
         """Whether the picture on show has heat."""
@@ -130,12 +131,12 @@ def test_a_chosen_phrase_lights_nothing_in_a_picture_of_which_it_is_not_told(vie
 
     def tell(state: State) -> None:
         view = rested(viewport, state)
-        assert view is not None and not lit(state)
+        assert not lit(state)
         viewport.narrow(view.name, view.relevance)
         assert lit(state)
 
     tell(red)
-    viewport.mark(SceneMemory(scene), delete(marks, Mask.first(marks.selected.count, 90)), None)
+    viewport.mark(SceneMemory(info.scene), delete(marks, Mask.first(marks.selected.count, 90)), None)
     tell(red)
     turned = red.with_scene(pose=orbit(red.scene.pose, 0.1, 0.0))
     viewport.update(turned, SIZE, touched=turned.now)  # and back before it rests
